@@ -1,0 +1,388 @@
+"""The lifecycle node that all drivers share: parameters, the bus thread, diagnostics, shut-down."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticStatus
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.exceptions import InvalidParameterValueException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter as RosParameter
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from std_srvs.srv import Trigger
+
+from driver_common import diagnostics
+from driver_common.device_thread import Bus, DeviceThread
+from driver_common.errors import DriverError, SettingError
+from driver_common.parameters import ParameterStore, refusal
+from driver_common.settings import Option, Setting, Value
+
+CONFIG_MODES = {"push": 0, "check": 1, "leave": 2}
+
+COMMON_OPTIONS = (
+    Option("sensors", kind=list, default=[],
+           description="Names of the sensors on the bus; empty = a single one without a name"),
+    Option("autostart", kind=bool, default=True,
+           description="Configure and activate without being asked"),
+    Option("config_mode", kind=str, choices=CONFIG_MODES, default="push",
+           description="What to do with settings that differ from the parameters given: "
+                       "push = write them, check = warn, leave = nothing"),
+)
+
+
+class DeviceNode(LifecycleNode):
+    """A driver: a bus with one or more devices.
+
+    Subclasses give the options and the bus, and publish what the bus reports.
+
+    Attributes:
+        bus: The session; None while the node is not configured.
+        thread: The thread that serves it.
+    """
+
+    BUS_OPTIONS: Sequence[Option] = ()
+    SENSOR_OPTIONS: Sequence[Option] = ()
+    ALL_SETTINGS: Mapping[str, Setting] = {}
+
+    def __init__(self, name: str) -> None:
+        """Declare the driver's own parameters.
+
+        Raises:
+            SettingError: One of them has an unacceptable value.
+        """
+        super().__init__(name, automatically_declare_parameters_from_overrides=True)
+        self.store = ParameterStore(self)
+        self.bus: Any = None
+        self.thread: DeviceThread | None = None
+        self._bus_error: DriverError | None = None
+        self._diagnostics = diagnostics.Diagnostics(self)
+        self._devices: dict[str, Any] = {}
+        self._entities: list[Callable[[], object]] = []
+        self._declare_options()
+        self.create_timer(diagnostics.PERIOD, self._publish_diagnostics)
+
+    # --- what a driver provides ---
+
+    def make_bus(self) -> Bus:
+        """Return the session, not yet opened; raises DriverError."""
+        raise NotImplementedError
+
+    def make_interfaces(self, sensor: str) -> None:
+        """Create the publishers and services of a sensor that do not depend on its model."""
+        raise NotImplementedError
+
+    def status_of(self, device: Any) -> DiagnosticStatus:
+        """Return the diagnostics of a device."""
+        raise NotImplementedError
+
+    def apply_options(self) -> None:
+        """Hand live options to the bus after a change."""
+
+    def release(self) -> None:
+        """Close what `make_bus` opened beside the bus."""
+
+    # --- parameters ---
+
+    def _declare_options(self) -> None:
+        for option in (*COMMON_OPTIONS, *self.BUS_OPTIONS):
+            self._declare_option("", option)
+        for sensor in self.sensors:
+            for option in self.SENSOR_OPTIONS:
+                self._declare_option(self.prefix(sensor), option)
+        self._warn_of_unknown_overrides()
+
+    def _declare_option(self, prefix: str, option: Option) -> None:
+        name = prefix + option.name
+        default = option.default
+        if isinstance(default, str) and "{sensor}" in default:
+            default = default.format(sensor=prefix.rstrip(".") or self.get_name())
+        try:
+            value = option.check(self.store.overrides.get(name, default))
+        except SettingError as error:
+            raise SettingError(f"{prefix}{error}") from None
+        self.store.declare(name, option, value)
+
+    def _warn_of_unknown_overrides(self) -> None:
+        """Name overrides that no model of this driver could have."""
+        known = [option.name for option in (*COMMON_OPTIONS, *self.BUS_OPTIONS)]
+        for sensor in self.sensors:
+            known += [self.prefix(sensor) + name for name in (
+                *(option.name for option in self.SENSOR_OPTIONS), *self.ALL_SETTINGS)]
+        for line in self.store.unknown_overrides("", known, "this driver"):
+            self.get_logger().warning(line)
+
+    @property
+    def sensors(self) -> list[str]:
+        """Names of the sensors, [""] for a single one without a name."""
+        names: list[str] = self.get_parameter("sensors").value
+        return list(names) or [""]
+
+    @staticmethod
+    def prefix(sensor: str) -> str:
+        """Return the prefix of a sensor's parameters."""
+        return f"{sensor}." if sensor else ""
+
+    @staticmethod
+    def topic(sensor: str, name: str) -> str:
+        """Return the name of a sensor's topic or service."""
+        return f"~/{sensor}/{name}" if sensor else f"~/{name}"
+
+    def option(self, name: str, sensor: str = "") -> Any:
+        """Return the value of an option."""
+        return self.get_parameter(self.prefix(sensor) + name).value
+
+    def wanted_settings(self, sensor: str) -> dict[str, Value]:
+        """Return the device settings that the user gave for a sensor."""
+        prefix = self.prefix(sensor)
+        return {name[len(prefix):]: value for name, value in self.store.overrides.items()
+                if name.startswith(prefix)
+                and name[len(prefix):] in self.ALL_SETTINGS}  # type: ignore[misc]
+
+    def show_settings(self, sensor: str, device: Any) -> None:
+        """Declare a device's settings with the values that it reported; from any thread."""
+        settings, values = dict(device.settings), dict(device.values)
+        self._later(lambda: self._show_settings(sensor, device, settings, values))
+
+    def _show_settings(self, sensor: str, device: Any, settings: Mapping[str, Setting],
+                       values: Mapping[str, Value]) -> None:
+        if self.bus is None:
+            return
+        prefix = self.prefix(sensor)
+        gone = [name for name, owner in self._devices.items()
+                if owner is device and name.removeprefix(prefix) not in settings]
+        self.store.undeclare(gone)
+        for name in gone:
+            del self._devices[name]
+        for name, setting in settings.items():
+            self.store.declare(prefix + name, setting, values[name])
+            self._devices[prefix + name] = device
+        lacking = [name for name in self.wanted_settings(sensor) if name not in settings]
+        for name in lacking:
+            self.get_logger().warning(f"parameter {prefix}{name}: the {device.model.name} has no "
+                                      "such setting; it is ignored")
+
+    def set_parameters_atomically(
+            self, parameter_list: list[RosParameter]) -> SetParametersResult:
+        """Set parameters, all or none; those of a device are written to it and read back."""
+        own = [parameter for parameter in parameter_list
+               if parameter.name in self.store.rows or not self.has_parameter(parameter.name)]
+        if not own:
+            return super().set_parameters_atomically(parameter_list)
+        try:
+            return self.store.store(self._apply(self.store.check(own)))
+        except DriverError as error:
+            return refusal(error)
+        except Exception as error:  # an exception here would end the node
+            return refusal(DriverError(f"internal error, please report it: {error!r}"))
+
+    def set_parameters(self, parameter_list: list[RosParameter]) -> list[SetParametersResult]:
+        """Set parameters one by one."""
+        return [self.set_parameters_atomically([parameter]) for parameter in parameter_list]
+
+    def _apply(self, values: Mapping[str, Value]) -> dict[str, Value]:
+        """Write device settings among `values`; return all values as they are then."""
+        by_device: dict[Any, dict[str, Value]] = {}
+        for name, value in values.items():
+            if name in self._devices:
+                by_device.setdefault(self._devices[name], {})[name] = value
+            else:
+                self._check_may_change(name, value)
+        result = dict(values)
+        done: list[tuple[Any, dict[str, Value]]] = []
+        try:
+            for device, changes in by_device.items():
+                before = {name: self.get_parameter(name).value for name in changes}
+                result |= self._write(device, changes)
+                done.append((device, before))
+        except DriverError:
+            for device, before in reversed(done):
+                self._write(device, before)
+            raise
+        if len(result) > sum(map(len, by_device.values())):
+            self._later(self.apply_options)
+        return result
+
+    def _write(self, device: Any, changes: Mapping[str, Value]) -> dict[str, Value]:
+        prefix = self.prefix(device.options.name)
+        reported = self.call(lambda: self.bus.write(
+            device, {name.removeprefix(prefix): value for name, value in changes.items()}))
+        return {prefix + name: value for name, value in reported.items()}
+
+    def _check_may_change(self, name: str, value: Value) -> None:
+        option = self.store.rows[name]
+        if (isinstance(option, Option) and not option.live and self.bus is not None
+                and value != self.get_parameter(name).value):
+            node = self.get_fully_qualified_name()
+            raise SettingError(
+                f"{name} cannot change while the node is configured; first run 'ros2 lifecycle "
+                f"set {node} deactivate' and 'ros2 lifecycle set {node} cleanup'")
+
+    # --- the bus ---
+
+    def call(self, job: Callable[[], Any]) -> Any:
+        """Run a job in the thread of the bus; raises DriverError."""
+        if self.thread is None:
+            raise DriverError("the node is not configured; run 'ros2 lifecycle set "
+                              f"{self.get_fully_qualified_name()} configure'")
+        return self.thread.call(job)
+
+    def _later(self, job: Callable[[], object]) -> None:
+        """Run a job in the executor, where parameters may be touched."""
+        if self.executor is not None:
+            self.executor.create_task(job)
+
+    def on_bus_state(self, error: DriverError | None) -> None:
+        """Take note that the link opened or failed; one line in the log per change."""
+        if not self.context.ok():
+            return
+        if error is not None and str(error) != str(self._bus_error):
+            self.get_logger().error(f"{error} (waiting for it)")
+        elif error is None and self._bus_error is not None:
+            self.get_logger().info("the link is open again")
+        self._bus_error = error
+
+    # --- interfaces ---
+
+    def add_publisher(self, kind: Any, sensor: str, name: str, depth: int = 10) -> Any:
+        """Create a reliable publisher whose QoS can be overridden; gone at clean-up."""
+        publisher = self.create_publisher(
+            kind, self.topic(sensor, name), depth,
+            qos_overriding_options=QoSOverridingOptions.with_default_policies())
+        self._entities.append(lambda: self.destroy_publisher(publisher))
+        return publisher
+
+    def add_trigger(self, sensor: str, name: str, action: Callable[[], str]) -> None:
+        """Create a service which runs `action` and answers with its text, or with its error."""
+        def handle(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            try:
+                response.message = action()
+                response.success = True
+            except DriverError as error:
+                response.message = str(error)
+            except Exception as error:  # an exception here would end the node
+                response.message = f"internal error, please report it: {error!r}"
+            (self.get_logger().info if response.success else self.get_logger().error)(
+                f"{name}: {response.message}")
+            return response
+
+        service = self.create_service(Trigger, self.topic(sensor, name), handle)
+        self._entities.append(lambda: self.destroy_service(service))
+
+    def _publish_diagnostics(self) -> None:
+        if self.bus is None:
+            statuses: Iterable[DiagnosticStatus] = [diagnostics.to_status(
+                self.get_name(), "", diagnostics.STALE, "not configured", {})]
+        elif self._bus_error is not None:
+            statuses = [diagnostics.to_status(
+                self.get_name(), "", diagnostics.ERROR, str(self._bus_error), {})]
+        else:
+            statuses = [self.status_of(device) for device in self.bus.devices]
+        self._diagnostics.publish(statuses)
+
+    # --- lifecycle ---
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Open the bus in its own thread, which waits for the devices."""
+        try:
+            bus = self.make_bus()
+            for sensor in self.sensors:
+                self.make_interfaces(sensor)
+        except (DriverError, InvalidParameterValueException) as error:
+            self.get_logger().error(str(error))
+            self._close()
+            return TransitionCallbackReturn.FAILURE
+        self.bus = bus
+        self.thread = DeviceThread(f"{self.get_name()} bus", bus, self.on_bus_state)
+        self.thread.start()
+        return super().on_configure(state)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Start measuring and publishing."""
+        assert self.thread is not None
+        self.thread.post(lambda: self.bus.set_active(True))
+        return super().on_activate(state)
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Stop the devices."""
+        try:
+            self.call(lambda: self.bus.set_active(False))
+        except DriverError as error:
+            self.get_logger().warning(str(error))
+        return super().on_deactivate(state)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Close the bus."""
+        self._close()
+        return super().on_cleanup(state)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Close the bus."""
+        self._close()
+        return super().on_shutdown(state)
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Close the bus and become unconfigured; the reason was swallowed by rclpy."""
+        self.get_logger().error(f"a transition from {state.label} failed")
+        self._close()
+        return TransitionCallbackReturn.SUCCESS
+
+    def _close(self) -> None:
+        if self.thread is not None:
+            self.thread.stop()
+        self.release()
+        self.thread = None
+        self.bus = None
+        self._bus_error = None
+        self.store.undeclare(self._devices)
+        self._devices.clear()
+        for destroy in self._entities:
+            destroy()
+        self._entities.clear()
+
+    def destroy_node(self) -> None:
+        """Leave the devices stopped and the port closed."""
+        if self.thread is not None:
+            self.thread.stop()
+        self.release()
+        super().destroy_node()
+
+
+def run(make_node: Callable[[], DeviceNode], args: Sequence[str] | None = None) -> int:
+    """Run a driver until it is told to stop; return the exit code of the process."""
+    node = None
+    try:
+        rclpy.init(args=args)
+        node = make_node()
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        if node.option("autostart"):
+            if node.trigger_configure() != TransitionCallbackReturn.SUCCESS:
+                return 1
+            node.trigger_activate()
+        executor.spin()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except DriverError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    except rclpy.exceptions.ROSInterruptException:
+        pass
+    except Exception as error:
+        if node is None and isinstance(error, _ArgumentErrors):
+            print(f"error: {str(error).splitlines()[0]}", file=sys.stderr)
+            return 1
+        raise
+    finally:
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
+    return 0
+
+
+_ArgumentErrors = (RuntimeError, ValueError, rclpy.exceptions.InvalidParameterException,
+                   rclpy.exceptions.InvalidParameterValueException)

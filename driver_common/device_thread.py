@@ -1,0 +1,149 @@
+"""The one thread of a bus: it alone talks to the devices, and it never gives up."""
+
+from __future__ import annotations
+
+import queue
+import threading
+import traceback
+from collections.abc import Callable
+from concurrent.futures import Future
+from concurrent.futures import TimeoutError as FutureTimeoutError
+from typing import Any, Protocol, TypeVar
+
+from driver_common.errors import DriverError, NoAnswerError
+
+T = TypeVar("T")
+
+CALL_TIMEOUT = 15.0  # s; longer than any single job
+
+
+class Backoff:
+    """Growing pauses between attempts.
+
+    Attributes:
+        first: First pause in s.
+        last: Longest pause in s.
+    """
+
+    def __init__(self, first: float = 0.1, last: float = 2.0) -> None:
+        """Start with the first pause."""
+        self.first = first
+        self.last = last
+        self._next = first
+
+    def pause(self) -> float:
+        """Return the next pause in s, each time twice the one before."""
+        pause = min(self._next, self.last)
+        self._next = 2 * pause
+        return pause
+
+    def reset(self) -> None:
+        """Begin again with the first pause."""
+        self._next = self.first
+
+
+class Bus(Protocol):
+    """What a driver's session offers to the thread."""
+
+    def open(self) -> None:
+        """Open the link; raises DriverError."""
+
+    def poll(self) -> float:
+        """Do one step and return how long in s nothing needs to be done; raises DriverError."""
+
+    def close(self) -> None:
+        """Leave the devices stopped and close the link, in whatever state they are."""
+
+
+class DeviceThread(threading.Thread):
+    """Opens a bus, polls it, and opens it again after errors, for ever.
+
+    Everything that touches the bus runs here; others hand in their work with `call`.
+    """
+
+    def __init__(self, name: str, bus: Bus, on_state: Callable[[DriverError | None], None]) -> None:
+        """Prepare the thread.
+
+        Args:
+            name: Name of the thread.
+            bus: The bus to serve.
+            on_state: Called in this thread with None when the link opened, or with the error that
+                closed it or kept it closed.
+        """
+        super().__init__(name=name, daemon=True)
+        self._bus = bus
+        self._on_state = on_state
+        self._jobs: queue.SimpleQueue[tuple[Callable[[], Any], Future[Any]] | None] = (
+            queue.SimpleQueue())
+        self._stopping = False
+
+    def call(self, job: Callable[[], T], timeout: float = CALL_TIMEOUT) -> T:
+        """Run `job` in the thread of the bus and return its result, or raise what it raises."""
+        if threading.current_thread() is self:
+            return job()
+        if self._stopping or not self.is_alive():
+            raise NoAnswerError("the link is closed")
+        future: Future[T] = Future()
+        self._jobs.put((job, future))
+        try:
+            return future.result(timeout)
+        except FutureTimeoutError:
+            future.cancel()
+            raise NoAnswerError(f"the device was busy for more than {timeout:g} s; "
+                                "try again") from None
+
+    def post(self, job: Callable[[], Any]) -> None:
+        """Have `job` run in the thread of the bus, without waiting for it."""
+        self._jobs.put((job, Future()))
+
+    def stop(self) -> None:
+        """Close the bus, end the thread and wait for it."""
+        self._stopping = True
+        self._jobs.put(None)
+        if self.is_alive():
+            self.join()
+
+    def run(self) -> None:
+        """Keep the bus open until `stop`."""
+        backoff = Backoff()
+        while not self._stopping:
+            try:
+                self._bus.open()
+                backoff.reset()
+                self._on_state(None)
+                while not self._stopping:
+                    self._run_jobs(self._bus.poll())
+            except DriverError as error:
+                self._on_state(error)
+            except Exception as error:  # a bug must not end the driver
+                self._on_state(_internal(error))
+            finally:
+                self._bus.close()
+            if not self._stopping:
+                self._run_jobs(backoff.pause())
+        self._run_jobs(0)
+
+    def _run_jobs(self, pause: float) -> None:
+        """Run waiting jobs; with none waiting, wait up to `pause` s for the first one."""
+        try:
+            item = self._jobs.get(timeout=pause) if pause > 0 else self._jobs.get_nowait()
+            while item is not None:
+                self._run_job(*item)
+                item = self._jobs.get_nowait()
+        except queue.Empty:
+            pass
+
+    @staticmethod
+    def _run_job(job: Callable[[], Any], future: Future[Any]) -> None:
+        if not future.set_running_or_notify_cancel():
+            return
+        try:
+            future.set_result(job())
+        except Exception as error:  # belongs to the caller
+            future.set_exception(error)
+
+
+def _internal(error: Exception) -> DriverError:
+    where = traceback.extract_tb(error.__traceback__)[-1]
+    return DriverError(f"internal error, please report it: {type(error).__name__}: {error} "
+                       f"({where.filename}:{where.lineno})")

@@ -1,0 +1,33 @@
+"""The error tree of all drivers.
+
+Every error that a user can meet is a `DriverError`; its text names the thing and the next step,
+so that a node can log it as it is.
+"""
+
+
+class DriverError(Exception):
+    """Base of all errors that a driver raises on purpose."""
+
+
+class LinkError(DriverError):
+    """The link itself failed: no such port, no permission, in use, unplugged, server gone."""
+
+
+class NoAnswerError(DriverError):
+    """A request stayed without an answer within its time-out."""
+
+
+class FrameError(DriverError):
+    """A frame has a wrong checksum, length or content."""
+
+
+class RefusedError(DriverError):
+    """The device answered that it cannot carry out the request."""
+
+
+class WrongDeviceError(DriverError):
+    """Another device answered than the one asked for, or one that is not known."""
+
+
+class SettingError(DriverError, ValueError):
+    """A value or a name of a setting is not acceptable; the device was not touched."""

@@ -1,0 +1,134 @@
+"""A serial port, opened well: errors in words, bytes in and out."""
+
+from __future__ import annotations
+
+import errno
+import os
+
+import serial
+from serial.tools import list_ports
+
+from driver_common.errors import LinkError
+
+BITS_PER_BYTE = 10  # 8N1
+WRITE_TIMEOUT = 1.0  # s
+_ADVICE = {
+    errno.ENOENT: "there is no such port{ports}; is it plugged in?",
+    errno.EACCES: "no permission; add yourself to the group dialout with "
+                  "'sudo usermod -aG dialout $USER' and log in again",
+    errno.EWOULDBLOCK: "it is in use by another program; close that one first "
+                       "('fuser -v {port}' names it)",
+    errno.EBUSY: "it is in use by another program; close that one first "
+                 "('fuser -v {port}' names it)",
+    errno.EIO: "it is gone; is it plugged in?",
+    errno.ENXIO: "it is gone; is it plugged in?",
+    errno.ECONNREFUSED: "nothing listens there; check host and port",
+    errno.EISDIR: "that is no serial port{ports}",
+    errno.ENOTTY: "that is no serial port{ports}",
+}
+
+
+class SerialLink:
+    """A serial port, or any pyserial URL such as `socket://host:port`.
+
+    Args:
+        port: Device path or URL.
+        baud_rate: In Bd.
+
+    Raises:
+        LinkError: From every method, with what is wrong and what to do.
+    """
+
+    def __init__(self, port: str, baud_rate: int) -> None:
+        """Open the port for this process alone."""
+        self.port = port
+        self._baud_rate = baud_rate
+        if not port:
+            raise LinkError(f"serial_port is not set; give a device path{_other_ports()}, "
+                            f"a URL such as socket://host:port, or sim://MODEL")
+        try:
+            self._serial = serial.serial_for_url(
+                port, baud_rate, timeout=0, write_timeout=WRITE_TIMEOUT, exclusive=True)
+        except (serial.SerialException, ValueError, OSError) as error:
+            raise LinkError(f"cannot open {port}: {_reason(port, error)}") from error
+        try:
+            self._serial.set_low_latency_mode(True)
+        except (AttributeError, ValueError, OSError, NotImplementedError):
+            pass  # a pseudo-terminal, a socket or a driver without it
+
+    @property
+    def baud_rate(self) -> int:
+        """Baud rate in Bd."""
+        return self._baud_rate
+
+    @baud_rate.setter
+    def baud_rate(self, baud_rate: int) -> None:
+        if baud_rate != self._baud_rate:
+            with _Guard(self.port):
+                self._serial.baudrate = baud_rate
+            self._baud_rate = baud_rate
+
+    def seconds(self, length: int) -> float:
+        """Return the time that `length` bytes take on the line."""
+        return length * BITS_PER_BYTE / self._baud_rate
+
+    def write(self, data: bytes) -> None:
+        """Send all bytes without a break."""
+        with _Guard(self.port):
+            self._serial.write(data)
+
+    def read(self, timeout: float) -> bytes:
+        """Return what has arrived; wait up to `timeout` s for the first byte, else b""."""
+        with _Guard(self.port):
+            waiting = self._serial.in_waiting
+            if not waiting:
+                self._serial.timeout = max(timeout, 0)
+                first: bytes = self._serial.read(1)
+                if not first:
+                    return b""
+                waiting = self._serial.in_waiting
+                return first + (self._serial.read(waiting) if waiting else b"")
+            data: bytes = self._serial.read(waiting)
+            return data
+
+    def close(self) -> None:
+        """Close the port; it may be gone already."""
+        try:
+            self._serial.close()
+        except (OSError, serial.SerialException):
+            pass  # unplugged
+
+
+class _Guard:
+    """Turns what pyserial raises when a port vanishes into a LinkError."""
+
+    def __init__(self, port: str) -> None:
+        self._port = port
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if isinstance(error, serial.SerialTimeoutException):
+            raise LinkError(f"{self._port} takes no bytes; is flow control on?") from error
+        # TypeError: pyserial's own when the port was closed under it.
+        if isinstance(error, (OSError, TypeError)):
+            raise LinkError(f"lost {self._port}: {_reason(self._port, error)}") from error
+
+
+def _reason(port: str, error: Exception) -> str:
+    number = getattr(error, "errno", None)
+    if number is None and isinstance(error.__context__, OSError):
+        number = error.__context__.errno
+    if number in _ADVICE:
+        return _ADVICE[number].format(port=port, ports=_other_ports())
+    if "disconnected" in str(error) or "returned no data" in str(error):
+        return "it was unplugged or closed by the other side"
+    if number is not None:
+        return os.strerror(number)
+    return str(error)
+
+
+def _other_ports() -> str:
+    ports = sorted(port.device for port in list_ports.comports())
+    return f" (present: {', '.join(ports)})" if ports else " (no serial port is present)"

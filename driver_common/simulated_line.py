@@ -1,0 +1,256 @@
+"""The wire of a simulated serial device: a pseudo-terminal or a TCP port, with real timing.
+
+The device itself is sans-I/O: bytes in, timed replies out. Here they get a transport which keeps
+the baud rate, and which can misbehave.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import heapq
+import itertools
+import os
+import random
+import select
+import socket
+import termios
+import threading
+import time
+import tty
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+from driver_common.errors import LinkError
+from driver_common.serial_link import BITS_PER_BYTE
+
+CHUNK_TIME = 0.002  # s of line time that is written at once
+SPEEDS = {getattr(termios, name): int(name[1:]) for name in dir(termios) if name[1:].isdigit()}
+
+
+class SimulatedDevice(Protocol):
+    """Devices on one line, without I/O."""
+
+    baud_rate: int
+
+    def receive(self, data: bytes, now: float) -> Iterable[tuple[float, bytes]]:
+        """Take the master's bytes; return replies, each with the monotonic time it begins."""
+
+
+@dataclass
+class Faults:
+    """How the line misbehaves; probabilities are per reply.
+
+    Attributes:
+        drop: Probability that a reply is lost.
+        corrupt: Probability that one of its bytes is damaged.
+        noise: Probability that random bytes come in front of it.
+        split: Pause in s in the middle of each reply.
+        delay: Additional time in s before each reply.
+        echo: Whether the master hears its own bytes.
+        silent: Whether nothing gets through.
+    """
+
+    drop: float = 0.0
+    corrupt: float = 0.0
+    noise: float = 0.0
+    split: float = 0.0
+    delay: float = 0.0
+    echo: bool = False
+    silent: bool = False
+    random: random.Random = field(default_factory=lambda: random.Random(1))
+
+    def apply(self, due: float, reply: bytes) -> list[tuple[float, bytes]]:
+        """Return the pieces that arrive in place of `reply`, each with its time."""
+        if self.silent or self.random.random() < self.drop:
+            return []
+        due += self.delay
+        if self.random.random() < self.corrupt:
+            damaged = bytearray(reply)
+            damaged[self.random.randrange(len(reply))] ^= 1 << self.random.randrange(8)
+            reply = bytes(damaged)
+        if self.random.random() < self.noise:
+            reply = self.random.randbytes(self.random.randint(1, 20)) + reply
+        if self.split:
+            middle = len(reply) // 2
+            return [(due, reply[:middle]), (due + self.split, reply[middle:])]
+        return [(due, reply)]
+
+
+class SimulatedLine:
+    """A serial line with simulated devices, served by a thread.
+
+    Attributes:
+        port: What a driver opens: the path of a pseudo-terminal, or a socket:// URL.
+        faults: How the line misbehaves; may be changed at any time.
+    """
+
+    def __init__(self, device: SimulatedDevice, *, link: str = "", listen: str = "") -> None:
+        """Open the line; `start` serves it.
+
+        Args:
+            device: What is connected to it.
+            link: Path of a symbolic link to the pseudo-terminal.
+            listen: "host:port" to serve TCP instead of a pseudo-terminal.
+
+        Raises:
+            LinkError: The link or the TCP port cannot be made.
+        """
+        self.faults = Faults()
+        self._device = device
+        self._transport = _Tcp(listen) if listen else _Pty(link)
+        self.port = self._transport.port
+        self._due: list[tuple[float, int, bytes]] = []
+        self._order = itertools.count()
+        self._line_free = 0.0
+        self._wake_reader, self._wake_writer = os.pipe()
+        self._thread = threading.Thread(target=self._run, name="simulated line", daemon=True)
+
+    def start(self) -> SimulatedLine:
+        """Serve the line in a thread."""
+        self._thread.start()
+        return self
+
+    def close(self) -> None:
+        """Take the line away, as if it were unplugged."""
+        if self._thread.is_alive():
+            os.write(self._wake_writer, b".")
+            self._thread.join()
+        self._transport.close()
+        with contextlib.suppress(OSError):
+            os.close(self._wake_reader)
+            os.close(self._wake_writer)
+
+    def _run(self) -> None:
+        while True:
+            timeout = max(0.0, self._due[0][0] - time.monotonic()) if self._due else None
+            ready, _, _ = select.select(
+                [self._wake_reader, *self._transport.readers()], [], [], timeout)
+            if self._wake_reader in ready:
+                return
+            data = self._transport.read(ready)
+            if data:
+                self._receive(data, time.monotonic())
+            self._send(time.monotonic())
+
+    def _receive(self, data: bytes, now: float) -> None:
+        speed = self._transport.speed()
+        if speed and speed != self._device.baud_rate:
+            data = bytes(byte ^ 0x5A for byte in data)  # what a wrong baud rate makes of them
+        arrived = now + len(data) * self._byte_time
+        if self.faults.echo:
+            self._schedule(now, data)
+        for due, reply in self._device.receive(data, arrived):
+            for piece_due, piece in self.faults.apply(due, reply):
+                self._schedule(piece_due, piece)
+
+    @property
+    def _byte_time(self) -> float:
+        return BITS_PER_BYTE / self._device.baud_rate
+
+    def _schedule(self, due: float, data: bytes) -> None:
+        """Plan bytes in chunks, each at the time at which its last byte has been sent."""
+        due = max(due, self._line_free)
+        size = max(1, round(CHUNK_TIME / self._byte_time))
+        for start in range(0, len(data), size):
+            chunk = data[start:start + size]
+            due += len(chunk) * self._byte_time
+            heapq.heappush(self._due, (due, next(self._order), chunk))
+        self._line_free = due
+
+    def _send(self, now: float) -> None:
+        while self._due and self._due[0][0] <= now:
+            self._transport.write(heapq.heappop(self._due)[2])
+
+
+class _Pty:
+    """A pseudo-terminal; the other side sees a serial port."""
+
+    def __init__(self, link: str) -> None:
+        self._master, self._slave = os.openpty()
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        self.port = os.ttyname(self._slave)
+        self._link = Path(link) if link else None
+        if self._link is not None:
+            try:
+                if self._link.is_symlink():
+                    self._link.unlink()
+                self._link.symlink_to(self.port)
+            except OSError as error:
+                raise LinkError(f"cannot make the link {link}: {error.strerror}") from error
+
+    def readers(self) -> list[int]:
+        return [self._master]
+
+    def read(self, ready: list[int]) -> bytes:
+        if self._master not in ready:
+            return b""
+        try:
+            return os.read(self._master, 4096)
+        except BlockingIOError:
+            return b""
+
+    def speed(self) -> int:
+        """Return the baud rate that the other side has set."""
+        return SPEEDS.get(termios.tcgetattr(self._master)[5], 0)
+
+    def write(self, data: bytes) -> None:
+        with contextlib.suppress(BlockingIOError):  # nobody reads: a real line forgets as well
+            os.write(self._master, data)
+
+    def close(self) -> None:
+        if self._link is not None and self._link.is_symlink():
+            with contextlib.suppress(OSError):
+                self._link.unlink()
+        for descriptor in (self._master, self._slave):
+            with contextlib.suppress(OSError):
+                os.close(descriptor)
+
+
+class _Tcp:
+    """A TCP port for one client after the other, like a serial device server."""
+
+    def __init__(self, listen: str) -> None:
+        host, _, port = listen.rpartition(":")
+        try:
+            self._server = socket.create_server((host or "127.0.0.1", int(port)))
+        except (OSError, ValueError) as error:
+            raise LinkError(f"cannot listen on {listen}: {error}") from error
+        self._client: socket.socket | None = None
+        address = self._server.getsockname()
+        self.port = f"socket://{address[0]}:{address[1]}"
+
+    def readers(self) -> list[int]:
+        return [self._server.fileno()] + ([self._client.fileno()] if self._client else [])
+
+    def read(self, ready: list[int]) -> bytes:
+        if self._server.fileno() in ready:
+            if self._client is not None:
+                self._client.close()
+            self._client = self._server.accept()[0]
+            self._client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        elif self._client is not None and self._client.fileno() in ready:
+            try:
+                data = self._client.recv(4096)
+            except OSError:
+                data = b""
+            if data:
+                return data
+            self._client.close()
+            self._client = None
+        return b""
+
+    def speed(self) -> int:
+        return 0
+
+    def write(self, data: bytes) -> None:
+        if self._client is not None:
+            with contextlib.suppress(OSError):
+                self._client.sendall(data)
+
+    def close(self) -> None:
+        if self._client is not None:
+            self._client.close()
+        self._server.close()

@@ -1,0 +1,325 @@
+"""ROS 2 node of the iSYS radars: parameters, topics, services and diagnostics around a RadarBus."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticStatus
+from sensor_msgs.msg import PointCloud2, Range, Temperature
+from std_msgs.msg import Float32MultiArray
+
+from driver_common import diagnostics
+from driver_common.device_node import DeviceNode, run
+from driver_common.errors import DriverError
+from driver_common.settings import Option
+from driver_common.simulated_line import SimulatedLine
+from isys_radar_driver import commands
+from isys_radar_driver.commands import Command, RangeList
+from isys_radar_driver.models import find_model
+from isys_radar_driver.session import Listener, Options, Radar, RadarBus
+from isys_radar_driver.settings import ALL_SETTINGS
+from isys_radar_driver.simulator import simulated_line
+from isys_radar_driver.targets import TargetList
+from msg_conversions.multi_array import to_float32_multi_array
+from msg_conversions.point_cloud import to_point_cloud
+from msg_conversions.range import to_range
+from msg_conversions.temperature import to_temperature
+
+SIMULATED = "sim://"
+RESOLUTIONS = {"auto": 0, "16": 16, "32": 32}
+PWM_STEP = 0.01  # m or m/s, table 35
+
+
+class IsysRadarNode(DeviceNode, Listener):
+    """Driver of one or several iSYS radars on a serial line."""
+
+    BUS_OPTIONS = (
+        Option("serial_port", kind=str, default="",
+               description="Device path, pyserial URL such as socket://host:port, or sim://MODEL"),
+        Option("serial_baud", kind=int, default=0, minimum=0, unit="Bd",
+               description="Baud rate; 0 = the model's default"),
+    )
+    SENSOR_OPTIONS = (
+        Option("address", kind=int, default=0, minimum=0, maximum=255,
+               description="Address on the line; 0 = ask (only one sensor may be connected)"),
+        Option("model", kind=str, default="",
+               description="The only model that is accepted, such as iSYS-4001; empty = any"),
+        Option("frame_id", kind=str, default="{sensor}_link", live=True,
+               description="Frame of the measurements"),
+        Option("output", kind=int, default=1, minimum=1, maximum=3, live=True,
+               description="Output whose filter the target lists have passed"),
+        Option("target_list_resolution", kind=str, choices=RESOLUTIONS, default="auto", live=True,
+               description="Bits per value of the target lists; auto = the finest that fits the "
+                           "cycle at this baud rate"),
+        Option("time_offset", kind=float, default=0.0, unit="s", live=True,
+               description="Added to every stamp; negative where the measurement was earlier"),
+        Option("positive_velocity", kind=str, default="approaching", live=True,
+               choices={"approaching": -1, "receding": 1},
+               description="What the device means by a positive velocity"),
+        Option("positive_angle", kind=str, default="left", live=True,
+               choices={"left": 1, "right": -1},
+               description="What the device means by a positive angle"),
+        Option("publish_range_list", kind=bool, default=False, live=True,
+               description="Read the range list after every target list and publish ~/range and "
+                           "~/temperature (iSYS-6xxx)"),
+        Option("publish_digital_outputs", kind=bool, default=False, live=True,
+               description="Read the digital outputs after every target list and publish them"),
+        Option("new_address", kind=int, default=0, minimum=0, maximum=255, live=True,
+               description="Address that the service ~/change_address gives the sensor"),
+    )
+    ALL_SETTINGS = ALL_SETTINGS
+
+    def __init__(self) -> None:
+        """Declare the parameters; raises SettingError."""
+        self._simulator: SimulatedLine | None = None
+        self._publishers_of: dict[str, dict[str, Any]] = {}
+        super().__init__("isys_radar")
+
+    # --- set-up ---
+
+    def make_bus(self) -> RadarBus:
+        """Return the bus, with a simulator behind it where that was asked for."""
+        options = [self._sensor_options(sensor) for sensor in self.sensors]
+        port: str = self.option("serial_port")
+        if port.startswith(SIMULATED):
+            self._simulator, _ = simulated_line(
+                [port.removeprefix(SIMULATED)],
+                [option.address for option in options if option.address],
+                baud_rate=self.option("serial_baud"))
+            port = self._simulator.start().port
+        return RadarBus(port, self.option("serial_baud"), options, self)
+
+    def release(self) -> None:
+        """End the simulator."""
+        if self._simulator is not None:
+            self._simulator.close()
+            self._simulator = None
+
+    def _sensor_options(self, sensor: str) -> Options:
+        model = self.option("model", sensor)
+        options = Options(
+            name=sensor, address=self.option("address", sensor),
+            model=find_model(model) if model else None,
+            wanted=self.wanted_settings(sensor), config_mode=self.option("config_mode"))
+        self._set_live(options)
+        return options
+
+    def _set_live(self, options: Options) -> None:
+        """Hand over the options that may change at run time."""
+        name = options.name
+        options.output = self.option("output", name)
+        options.resolution = RESOLUTIONS[self.option("target_list_resolution", name)]
+        options.read_range_list = self.option("publish_range_list", name)
+        options.read_digital_outputs = self.option("publish_digital_outputs", name)
+
+    def apply_options(self) -> None:
+        """Hand live options to the bus."""
+        if self.bus is not None:
+            for radar in self.bus.devices:
+                self._set_live(radar.options)
+
+    def make_interfaces(self, sensor: str) -> None:
+        """Create topics and services of a sensor."""
+        self._publishers_of[sensor] = {name: self.add_publisher(kind, sensor, name)
+                                       for name, kind in (
+            ("points", PointCloud2), ("range", Range), ("temperature", Temperature),
+            ("dsp_temperature", Temperature), ("rfe_temperature", Temperature),
+            ("digital_outputs", Float32MultiArray), ("raw_signals", Float32MultiArray))}
+        for name, action in (
+                ("start_acquisition", lambda radar: self._enable(radar, True)),
+                ("stop_acquisition", lambda radar: self._enable(radar, False)),
+                ("preview_save", self._preview_save),
+                ("save_sensor_settings",
+                 lambda radar: self._save(radar, commands.SAVE_SENSOR_SETTINGS)),
+                ("save_application_settings",
+                 lambda radar: self._save(radar, commands.SAVE_APPLICATION_SETTINGS)),
+                ("save_all_settings",
+                 lambda radar: self._save(radar, commands.SAVE_ALL_SETTINGS)),
+                ("restore_factory_settings", self._restore_factory_settings),
+                ("set_default_temperature_thresholds", self._set_default_thresholds),
+                ("change_address", self._change_address),
+                ("read_raw_signals", self._read_raw_signals)):
+            self.add_trigger(sensor, name, lambda action=action: action(self._radar(sensor)))
+
+    def _radar(self, sensor: str) -> Radar:
+        radar: Radar = next(radar for radar in self.bus.devices if radar.options.name == sensor)
+        return radar
+
+    # --- what the bus reports, in its thread ---
+
+    def on_found(self, radar: Radar) -> None:
+        """Show the radar's settings as parameters."""
+        self.get_logger().info(f"{self._title(radar)}: connected to {radar.identity}, address "
+                               f"{radar.address}, {self.bus.baud_rate} Bd")
+        assert radar.model is not None
+        if not radar.model.has_target_lists:
+            self.get_logger().warning(
+                f"{self._title(radar)}: the {radar.model.name} does not hand out target lists "
+                "over its serial port, so there are no points; it can be configured here, and its "
+                "targets come from its other interfaces")
+        for name, (wanted, reported) in radar.differing.items():
+            self.get_logger().warning(
+                f"{self._title(radar)}: {name} is {radar.settings[name].text(reported)}, "
+                f"not {radar.settings[name].text(wanted)}")
+        self.show_settings(radar.options.name, radar)
+
+    def on_values(self, radar: Radar) -> None:
+        """Show the values that were read again."""
+        self.show_settings(radar.options.name, radar)
+
+    def on_lost(self, radar: Radar, error: DriverError) -> None:
+        """Log why there is no radar."""
+        self.get_logger().error(f"{self._title(radar)}: {error} (waiting for it)")
+
+    def on_note(self, radar: Radar, text: str, *, warning: bool = False) -> None:
+        """Log a line."""
+        logger = self.get_logger()
+        (logger.warning if warning else logger.info)(f"{self._title(radar)}: {text}")
+
+    def on_target_list(self, radar: Radar, targets: TargetList, stamp: int) -> None:
+        """Publish the targets as points."""
+        sensor = radar.options.name
+        angle_sign, velocity_sign = (
+            self.store.rows[self.prefix(sensor) + name].choices[self.option(name, sensor)]
+            for name in ("positive_angle", "positive_velocity"))
+        self._publish(radar, "points", to_point_cloud(
+            [(target.range, angle_sign * target.angle, velocity_sign * target.velocity,
+              target.signal) for target in targets.targets],
+            *self._frame_and_stamp(radar, stamp)))
+
+    def on_range_list(self, radar: Radar, values: RangeList, stamp: int) -> None:
+        """Publish range and temperature."""
+        assert radar.model is not None
+        where = self._frame_and_stamp(radar, stamp)
+        self._publish(radar, "range", to_range(
+            values.range, (0.0, radar.model.range_max), 0.0, *where))
+        self._publish(radar, "temperature", to_temperature(values.temperature, *where))
+        radar.temperatures["sensor"] = values.temperature
+
+    def on_digital_outputs(self, radar: Radar, values: tuple[int, ...], stamp: int) -> None:
+        """Publish the outputs: 0 or 1, and m or m/s where an output is a PWM."""
+        scaled = [value * PWM_STEP if radar.values.get(f"output{n}.mode") == "pwm" else value
+                  for n, value in enumerate(values, 1)]
+        self._publish(radar, "digital_outputs",
+                      to_float32_multi_array(np.array(scaled, np.float32), ["output"]))
+
+    def on_temperatures(self, radar: Radar, stamp: int) -> None:
+        """Publish the board temperatures."""
+        for name, celsius in radar.temperatures.items():
+            self._publish(radar, f"{name}_temperature",
+                          to_temperature(celsius, *self._frame_and_stamp(radar, stamp)))
+
+    def _publish(self, radar: Radar, topic: str, message: Any) -> None:
+        if self.context.ok():
+            self._publishers_of[radar.options.name][topic].publish(message)
+
+    def _frame_and_stamp(self, radar: Radar, stamp: int) -> tuple[str, int]:
+        sensor = radar.options.name
+        offset: float = self.option("time_offset", sensor)
+        return self.option("frame_id", sensor), stamp + round(offset * 1e9)
+
+    @staticmethod
+    def _title(radar: Radar) -> str:
+        return radar.options.name or "radar"
+
+    # --- services, in the executor ---
+
+    def _enable(self, radar: Radar, enabled: bool) -> str:
+        self.call(lambda: self.bus.set_enabled(radar, enabled))
+        return f"acquisition {'started' if enabled else 'stopped'}"
+
+    def _save(self, radar: Radar, command: Command[None]) -> str:
+        saved = self.call(lambda: self.bus.save(radar, command))
+        return "saved" + (f"; changed since the start: {', '.join(saved)}" if saved else "")
+
+    def _preview_save(self, radar: Radar) -> str:
+        stored = self.call(lambda: self.bus.stored_values(radar))
+        lines = [f"{name}: {radar.settings[name].text(value)} → "
+                 f"{radar.settings[name].text(radar.values[name])}"
+                 for name, value in stored.items() if value != radar.values[name]]
+        lines += [f"{name}: now {radar.settings[name].text(radar.values[name])}"
+                  for name in sorted(radar.unsaved) if name not in stored]
+        return "saving would change " + ("; ".join(lines) if lines else "nothing that is known")
+
+    def _restore_factory_settings(self, radar: Radar) -> str:
+        self.call(lambda: self.bus.restore_factory_settings(radar))
+        return "factory settings restored, in RAM and EEPROM"
+
+    def _set_default_thresholds(self, radar: Radar) -> str:
+        thresholds = self.call(
+            lambda: self.bus.execute(radar, commands.SET_DEFAULT_TEMPERATURE_THRESHOLDS))
+        return "temperature thresholds are " + ", ".join(f"{value:g} °C" for value in thresholds)
+
+    def _change_address(self, radar: Radar) -> str:
+        sensor = radar.options.name
+        address = self.option("new_address", sensor)
+        old = radar.address
+        self.call(lambda: self.bus.change_address(radar, address))
+        prefix = self.prefix(sensor)
+        self.store.store({prefix + "address": address, prefix + "new_address": 0})
+        return (f"the sensor moved from address {old} to {address} and keeps it; put "
+                f"'{prefix}address: {address}' into your parameter file")
+
+    def _read_raw_signals(self, radar: Radar) -> str:
+        raw = self.call(lambda: self.bus.read_raw_signals(radar))
+        self._publish(radar, "raw_signals", to_float32_multi_array(
+            raw.samples, ["signal", f"sample, {raw.sample_time:g} s apart"]))
+        signals, samples = raw.samples.shape
+        return (f"published {signals} signals of {samples} samples ({raw.samples.dtype}), "
+                f"{raw.sample_time * 1e6:g} µs apart")
+
+    # --- diagnostics ---
+
+    def status_of(self, radar: Radar) -> DiagnosticStatus:
+        """Return identity, link, rate, errors, temperatures and differing settings."""
+        identity, counts = radar.identity, radar.statistics
+        values: dict[str, object] = {"port": self.bus.port, "baud rate": self.bus.baud_rate,
+                                     "address": radar.address}
+        if identity is not None:
+            values |= {
+                "model": identity.model.name, "serial number": identity.serial_number,
+                "device name": identity.device_name, "firmware": identity.firmware,
+                "DSP hardware": identity.dsp_hardware, "RFE hardware": identity.rfe_hardware,
+                "bootloader": identity.bootloader, "cycle time [s]": radar.cycle_time,
+                "rate [Hz]": radar.rate}
+        values |= {
+            "target lists": counts.target_lists, "lost cycles": counts.lost_cycles,
+            "clippings": counts.clippings, "time-outs": counts.timeouts,
+            "refusals": counts.refusals, "connections": counts.connections,
+            "damaged frames": self.bus.damaged_frames, "dropped bytes": self.bus.dropped_bytes,
+            "stale frames": self.bus.stale_frames,
+            "unsaved settings": ", ".join(sorted(radar.unsaved))}
+        values |= {f"{name} temperature [°C]": celsius
+                   for name, celsius in radar.temperatures.items()}
+        values |= {f"{name} differs": f"wanted {wanted}, reported {reported}"
+                   for name, (wanted, reported) in radar.differing.items()}
+        name = f"{self.get_name()}: {self._title(radar)}"
+        hardware_id = f"{identity.model.name} {identity.serial_number}" if identity else ""
+        return diagnostics.to_status(name, hardware_id, *self._health(radar), values)
+
+    def _health(self, radar: Radar) -> tuple[bytes, str]:
+        """Return level and message of the diagnostics."""
+        model = radar.model
+        if model is None:
+            return diagnostics.ERROR, str(radar.error or "searching")
+        if radar.misses:
+            return diagnostics.WARN, "does not answer"
+        if radar.differing:
+            return diagnostics.WARN, f"{len(radar.differing)} settings are not as wanted"
+        if not radar.measuring:
+            return diagnostics.OK, "connected, acquisition stopped"
+        if not model.has_target_lists:
+            return diagnostics.OK, "connected; this model sends no target lists over serial"
+        message = f"{radar.rate:.1f} target lists per second"
+        expected = 1 / radar.cycle_time
+        if len(radar.arrivals) > 2 and radar.rate < 0.9 * expected:
+            return diagnostics.WARN, f"{message} instead of {expected:.1f}"
+        return diagnostics.OK, message
+
+
+def main(args: Sequence[str] | None = None) -> None:
+    """Run the node."""
+    sys.exit(run(IsysRadarNode, args))

@@ -1,0 +1,914 @@
+"""The conversation with the radars on one serial line: find, configure, measure.
+
+One request at a time, each with its time-out; several radars take turns. All of `RadarBus` runs in
+one thread (see `driver_common.device_thread`).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+from driver_common.device_thread import Backoff
+from driver_common.errors import (
+    DriverError,
+    FrameError,
+    LinkError,
+    NoAnswerError,
+    RefusedError,
+    SettingError,
+    WrongDeviceError,
+)
+from driver_common.serial_link import SerialLink
+from driver_common.settings import Raw, Record, Setting, Value, read_settings, write_settings
+from isys_radar_driver import commands
+from isys_radar_driver.commands import Command, IsysRecord, Location, RangeList, RawSignals, Version
+from isys_radar_driver.frames import (
+    BROADCAST,
+    FAILURE,
+    FIRST_ADDRESS,
+    LAST_ADDRESS,
+    MASTER,
+    Frame,
+    FrameParser,
+)
+from isys_radar_driver.models import BAUD_RATES, FAST, Model, model_of_product
+from isys_radar_driver.settings import is_application_setting, settings_of
+from isys_radar_driver.targets import Resolution, TargetList, decode_target_list
+
+T = TypeVar("T")
+
+REPLY_TIMEOUT = 0.100  # s until the first byte of a reply that needs no measurement
+LATENCY = 0.050  # s, allowance for USB adapters and the host
+EEPROM_TIMEOUT = 1.0  # s, writing the EEPROM takes its time
+RAW_TIMEOUT = 3.0  # s until the first byte of raw signals
+BYTE_GAP = 0.100  # s that a reply which has begun may pause
+ATTEMPTS = 2
+MISSES_UNTIL_LOST = 3
+KEEP_ALIVE = 1.0  # s between requests to a radar that is not measuring
+BROADCAST_WINDOW = 0.060  # s in which further sensors may answer a broadcast
+LINE_OVERHEAD = 9  # bytes of an SD2 frame beside its PDU
+RATE_WINDOW = 5.0  # s over which the rate is measured
+
+
+@dataclass(frozen=True)
+class Identity:
+    """Who a radar says it is (sections 3.3.2 and 3.3.6)."""
+
+    model: Model
+    device_name: str
+    firmware: Version
+    dsp_hardware: Version | None
+    rfe_hardware: Version | None
+    bootloader: Version | None
+
+    @property
+    def serial_number(self) -> str:
+        """What follows the model in the device name (errata I23)."""
+        return self.device_name.removeprefix(self.model.name).strip(" ,:#") or "unknown"
+
+    def __str__(self) -> str:
+        """Return model, serial number and firmware."""
+        return f"{self.model.name} {self.serial_number}, firmware {self.firmware}"
+
+
+@dataclass
+class Statistics:
+    """What was counted for one radar since the start."""
+
+    target_lists: int = 0
+    lost_cycles: int = 0
+    clippings: int = 0
+    timeouts: int = 0
+    refusals: int = 0
+    connections: int = 0
+
+
+@dataclass
+class Options:
+    """How one radar is to be used.
+
+    Attributes:
+        name: Name on a line with several, "" for a single one.
+        address: Its address; 0 = ask by broadcast.
+        model: The only model that is accepted; None = any.
+        output: Output filter of the target lists, 1 to 3.
+        resolution: 16 or 32 bit; 0 = what fits the line.
+        wanted: Settings that the radar is to have.
+        config_mode: "push" writes them, "check" compares, "leave" ignores them.
+        read_digital_outputs: Read the digital outputs after every target list.
+        read_range_list: Read the range list after every target list.
+    """
+
+    name: str = ""
+    address: int = BROADCAST
+    model: Model | None = None
+    output: int = 1
+    resolution: int = 0
+    wanted: dict[str, Value] = field(default_factory=dict)
+    config_mode: str = "push"
+    read_digital_outputs: bool = False
+    read_range_list: bool = False
+
+
+class Listener:
+    """What a user of the bus wants to hear; all called in the thread of the bus."""
+
+    def on_found(self, radar: Radar) -> None:
+        """Tell that the radar was identified and configured."""
+
+    def on_values(self, radar: Radar) -> None:
+        """Tell that values of settings were read again."""
+
+    def on_lost(self, radar: Radar, error: DriverError) -> None:
+        """Tell that the radar is not there (any more), once per change of the reason."""
+
+    def on_note(self, radar: Radar, text: str, *, warning: bool = False) -> None:
+        """Tell something worth a line in the log."""
+
+    def on_target_list(self, radar: Radar, targets: TargetList, stamp: int) -> None:
+        """Take a target list; `stamp` is the host's time in ns when the reply began."""
+
+    def on_digital_outputs(self, radar: Radar, values: tuple[int, ...], stamp: int) -> None:
+        """Take the state of the digital outputs."""
+
+    def on_range_list(self, radar: Radar, values: RangeList, stamp: int) -> None:
+        """Take a range list."""
+
+    def on_temperatures(self, radar: Radar, stamp: int) -> None:
+        """Tell that the board temperatures of a radar were read."""
+
+
+class Radar:
+    """One radar on the line: what is known of it, and what was counted.
+
+    Attributes:
+        options: How it is to be used.
+        address: Its address, 0 while unknown.
+        identity: Who it is; None while it is not connected.
+        settings: The settings that it has, by name.
+        values: The values that it reported, by name.
+        temperatures: Board temperatures in °C, by name.
+        differing: Settings which are not as wanted: name to (wanted, reported).
+        error: Why it is not connected.
+        enabled: Whether acquisition is wanted, as far as the user of the services says.
+        measuring: Whether acquisition was started.
+    """
+
+    def __init__(self, options: Options) -> None:
+        """Begin as an unknown radar."""
+        self.options = options
+        self.address = options.address
+        self.identity: Identity | None = None
+        self.settings: dict[str, Setting] = {}
+        self.values: dict[str, Value] = {}
+        self.temperatures: dict[str, float] = {}
+        self.differing: dict[str, tuple[Value, Value]] = {}
+        self.unsaved: set[str] = set()
+        self.error: DriverError | None = None
+        self.enabled = True
+        self.measuring = False
+        self.statistics = Statistics()
+        self.arrivals: deque[float] = deque()
+        self.backoff = Backoff()
+        self.due = 0.0  # monotonic time of the next step
+        self.misses = 0
+        self.fixed_targets = 0  # learned length of fixed-length lists
+        self.stale_replies_possible = False
+
+    @property
+    def name(self) -> str:
+        """Name of the radar in messages."""
+        return self.options.name or (f"address {self.address}" if self.address else "radar")
+
+    @property
+    def model(self) -> Model | None:
+        """The connected model."""
+        return self.identity.model if self.identity else None
+
+    @property
+    def cycle_time(self) -> float:
+        """Cycle time in s in the present measurement mode."""
+        if self.model is None:
+            return 0.0
+        return self.model.cycle_time(self._mode)
+
+    @property
+    def _mode(self) -> int:
+        setting = self.settings.get("measurement_mode")
+        value = self.values.get("measurement_mode")
+        if setting is None or setting.choices is None:
+            return FAST
+        return setting.choices.get(str(value), FAST)
+
+    @property
+    def max_targets(self) -> int:
+        """Most targets in a list in the present measurement mode."""
+        if self.model is None:
+            return 0
+        return self.model.max_targets.get(self._mode, max(self.model.max_targets.values()))
+
+    @property
+    def rate(self) -> float:
+        """Measured target lists per second."""
+        arrivals = self.arrivals
+        if len(arrivals) < 2 or time.monotonic() - arrivals[-1] > RATE_WINDOW:
+            return 0.0
+        return (len(arrivals) - 1) / (arrivals[-1] - arrivals[0])
+
+    def resolution(self, baud_rate: int) -> Resolution:
+        """Return the resolution to ask for; "auto" takes the finest that fits the cycle (I24).
+
+        Raises:
+            SettingError: The model does not have the resolution that was asked for.
+        """
+        assert self.model is not None
+        bits = self.options.resolution
+        possible = [resolution for resolution in self.model.resolutions
+                    if not bits or resolution.bits == bits]
+        if not possible:
+            raise SettingError(f"{self.model.name} has no target lists of {bits} bit; set "
+                               "target_list_resolution to auto")
+        for resolution in possible:
+            size = LINE_OVERHEAD + self.max_targets * (14 if resolution.bits == 32 else 7)
+            if size * 10 / baud_rate < self.cycle_time:
+                return resolution
+        return possible[-1]
+
+    def count_list(self, now: float, *, clipping: bool) -> None:
+        """Count a target list, and the cycles that passed without one."""
+        self.statistics.target_lists += 1
+        self.statistics.clippings += clipping
+        if self.arrivals:
+            cycles = round((now - self.arrivals[-1]) / self.cycle_time)
+            self.statistics.lost_cycles += max(0, cycles - 1)
+        self.arrivals.append(now)
+        while now - self.arrivals[0] > RATE_WINDOW:
+            self.arrivals.popleft()
+
+
+class RadarBus:
+    """Several radars on one serial line, or one.
+
+    Attributes:
+        devices: The radars, in the order of their turns.
+        stale_frames: Good frames that answered nothing.
+        link_error: Why the port is not open.
+    """
+
+    def __init__(self, port: str, baud_rate: int, radars: Iterable[Options],
+                 listener: Listener) -> None:
+        """Prepare the bus; nothing is opened.
+
+        Args:
+            port: Device path or pyserial URL.
+            baud_rate: In Bd; 0 = try the default rates of the models.
+            radars: How each radar is to be used.
+            listener: Told of everything that happens.
+        """
+        self.port = port
+        self.devices = [Radar(options) for options in radars]
+        self.stale_frames = 0
+        self._baud_rate = baud_rate
+        self._listener = listener
+        self.link_error: LinkError | None = None
+        self._link: SerialLink | None = None
+        self._parser = FrameParser()
+        self._active = False
+        self._turn = 0
+
+    # --- what the thread of the bus calls ---
+
+    def open(self) -> None:
+        """Open the port; raises LinkError."""
+        with self._link_errors_noted():
+            self._link = SerialLink(self.port, self._baud_candidates(self.devices[0])[0])
+        self.link_error = None
+        for radar in self.devices:
+            radar.due = 0.0
+            radar.backoff.reset()
+
+    def poll(self) -> float:
+        """Serve the next radar whose turn it is; return the time in s until the next turn."""
+        now = time.monotonic()
+        for offset in range(len(self.devices)):
+            index = (self._turn + offset) % len(self.devices)
+            radar = self.devices[index]
+            if radar.due <= now:
+                self._turn = index + 1
+                with self._link_errors_noted():
+                    self._serve(radar)
+                break
+        return max(0.0, min(radar.due for radar in self.devices) - time.monotonic())
+
+    def close(self) -> None:
+        """Leave the radars stopped and close the port."""
+        if self._link is None:
+            return
+        for radar in self.devices:
+            if radar.identity is not None:
+                with contextlib.suppress(DriverError):
+                    self._stop(radar)
+                self._forget(radar)
+        self._link.close()
+        self._link = None
+
+    # --- what a user calls, through the thread ---
+
+    @property
+    def damaged_frames(self) -> int:
+        """Frames with a wrong checksum or end delimiter."""
+        return self._parser.damaged_frames
+
+    @property
+    def dropped_bytes(self) -> int:
+        """Bytes that belonged to no frame."""
+        return self._parser.dropped_bytes
+
+    @property
+    def baud_rate(self) -> int:
+        """Baud rate of the link in Bd, 0 while it is closed."""
+        return self._link.baud_rate if self._link else 0
+
+    def set_active(self, active: bool) -> None:
+        """Start or stop the acquisition of all radars, now and after every reconnection."""
+        self._active = active
+        for radar in self.devices:
+            if radar.identity is not None:
+                try:
+                    self._start_or_stop(radar)
+                except (NoAnswerError, RefusedError) as error:
+                    self._lose(radar, error)
+
+    def set_enabled(self, radar: Radar, enabled: bool) -> None:
+        """Start or stop the acquisition of one radar; raises DriverError."""
+        self._require(radar)
+        radar.enabled = enabled
+        self._start_or_stop(radar)
+
+    def write(self, radar: Radar, changes: Mapping[str, Value]) -> dict[str, Value]:
+        """Write settings, all or none, and return what the radar reports.
+
+        Raises:
+            DriverError: Not connected, a bad value, a refusal or no answer.
+        """
+        self._require(radar)
+        with self._stopped_for(radar, changes):
+            reported = write_settings(_Access(self, radar), radar.settings, changes)
+        radar.unsaved |= {name for name in changes if reported[name] != radar.values.get(name)}
+        radar.options.wanted |= reported
+        radar.values |= reported
+        for name in changes:
+            radar.differing.pop(name, None)
+        return reported
+
+    def execute(self, radar: Radar, command: Command[T]) -> T:
+        """Carry out a command that the model has; raises DriverError."""
+        model = self._require(radar)
+        if not model.supports(command):
+            raise SettingError(f"{model.name} cannot {command.name}")
+        return self._execute(radar, command)
+
+    def read_raw_signals(self, radar: Radar) -> RawSignals:
+        """Read the raw signals of one measurement; needs the acquisition to run."""
+        model = self._require(radar)
+        if not model.supports(commands.READ_RAW):
+            raise SettingError(f"{model.name} cannot {commands.READ_RAW.name}")
+        if not radar.measuring:
+            raise SettingError("raw signals need the acquisition to run; start it first")
+        radar.arrivals.clear()  # the cycle is expanded on purpose (section 3.3.10)
+        return self._execute(radar, commands.READ_RAW, RAW_TIMEOUT)
+
+    def save(self, radar: Radar, command: Command[None]) -> list[str]:
+        """Save settings in the EEPROM; return the names of those changed since the last time."""
+        self.execute(radar, command)
+        saved = self.unsaved(radar, command)
+        radar.unsaved -= set(saved)
+        return saved
+
+    def unsaved(self, radar: Radar, command: Command[None]) -> list[str]:
+        """Return the settings that were changed by this driver and that a save would keep."""
+        return sorted(name for name in radar.unsaved if command is commands.SAVE_ALL_SETTINGS
+                      or is_application_setting(radar.settings[name])
+                      == (command is commands.SAVE_APPLICATION_SETTINGS))
+
+    def stored_values(self, radar: Radar) -> dict[str, Value]:
+        """Return what the EEPROM holds, for the settings that can be read from there."""
+        self._require(radar)
+        return read_settings(_Access(self, radar, Location.EEPROM), (
+            setting for setting in radar.settings.values() if _record(setting).has_location))
+
+    def restore_factory_settings(self, radar: Radar) -> None:
+        """Restore the factory settings, and read everything again."""
+        model = self._require(radar)
+        measuring = radar.measuring
+        self._stop(radar)
+        try:
+            self.execute(radar, commands.RESTORE_FACTORY_SETTINGS)
+            radar.options.wanted.clear()
+            radar.differing.clear()
+            radar.unsaved.clear()
+            try:
+                self._execute(radar, commands.READ_DEVICE_NAME)
+            except NoAnswerError:  # the address may have been restored as well
+                radar.address = model.address
+            radar.values = self._read_all(radar)
+        finally:
+            radar.measuring = measuring
+            self._start_or_stop(radar)
+        self._listener.on_values(radar)
+
+    def change_address(self, radar: Radar, address: int) -> None:
+        """Give the radar another address, for good, and follow it (errata I17).
+
+        Raises:
+            SettingError: The address is not allowed or taken.
+            DriverError: The radar refused or did not answer from the new address.
+        """
+        self._require(radar)
+        if not FIRST_ADDRESS <= address <= LAST_ADDRESS:
+            raise SettingError(f"address {address} is out of range, "
+                               f"allowed is {FIRST_ADDRESS} … {LAST_ADDRESS}")
+        if any(other is not radar and other.address == address for other in self.devices):
+            raise SettingError(f"address {address} belongs to another radar of this driver")
+        request = commands.change_address(radar.address, address)
+        self._exchange(radar, request, lambda frame: None, REPLY_TIMEOUT + EEPROM_TIMEOUT,
+                       sources=(address, radar.address))
+        radar.address = address
+        radar.options.address = address
+
+    # --- life of a radar ---
+
+    def _serve(self, radar: Radar) -> None:
+        """Do the radar's next step; only a LinkError gets out."""
+        if radar.identity is None:
+            self._find_or_wait(radar)
+            return
+        try:
+            if radar.measuring and radar.identity.model.has_target_lists:
+                self._measure(radar)
+            else:
+                self._keep_alive(radar)
+            radar.misses = 0
+        except RefusedError as error:
+            self._configure_again(radar, error)
+        except (NoAnswerError, FrameError) as error:
+            radar.statistics.timeouts += 1
+            radar.misses += 1
+            radar.due = 0.0
+            if radar.misses >= MISSES_UNTIL_LOST:
+                self._lose(radar, error)
+        except SettingError as error:
+            self._lose(radar, error)
+
+    def _find_or_wait(self, radar: Radar) -> None:
+        try:
+            self._find(radar)
+        except LinkError:
+            raise
+        except DriverError as error:
+            self._lose(radar, self._explained(radar, error))
+
+    def _lose(self, radar: Radar, error: DriverError) -> None:
+        """Note that the radar is not there; ask for it more and more rarely."""
+        news = radar.identity is not None or str(radar.error) != str(error)
+        self._forget(radar)
+        radar.error = error
+        others_work = any(other.identity for other in self.devices)
+        radar.backoff.last = 10.0 if others_work else 2.0
+        radar.due = time.monotonic() + radar.backoff.pause()
+        if news:
+            self._listener.on_lost(radar, error)
+
+    @staticmethod
+    def _forget(radar: Radar) -> None:
+        radar.identity = None
+        radar.measuring = False
+        radar.arrivals.clear()
+        radar.misses = 0
+        radar.address = radar.options.address
+
+    def _find(self, radar: Radar) -> None:
+        """Find the radar at one of the possible baud rates, identify and configure it."""
+        link = self._open_link()
+        failure: DriverError = NoAnswerError("no answer")
+        for baud_rate in self._baud_candidates(radar):
+            link.baud_rate = baud_rate
+            try:
+                if radar.options.address == BROADCAST:
+                    radar.address = self._ask_address(radar)
+                identity = self._identify(radar)
+                break
+            except (NoAnswerError, FrameError) as error:
+                failure = error
+        else:
+            raise failure
+        expected = radar.options.model
+        if expected is not None and identity.model.name != expected.name:
+            raise WrongDeviceError(f"expected an {expected.name}, but an {identity.model.name} "
+                                   f"answers at address {radar.address}; connect the right one or "
+                                   "change the parameter model")
+        radar.identity = identity
+        try:
+            self._configure(radar)
+        except DriverError:
+            radar.identity = None
+            raise
+        radar.error = None
+        radar.backoff.reset()
+        radar.statistics.connections += 1
+        self._listener.on_found(radar)
+
+    def _configure_again(self, radar: Radar, refusal: RefusedError) -> None:
+        """React to a radar that refuses to measure: it may have been reset without notice."""
+        self._listener.on_note(radar, f"{refusal}; configuring it again", warning=True)
+        try:
+            self._configure(radar)
+            if radar.measuring:
+                self._measure(radar)
+        except LinkError:
+            raise
+        except DriverError as error:
+            self._lose(radar, error)
+
+    def _configure(self, radar: Radar) -> None:
+        """Read all settings, make them as wanted, and start if that is wanted."""
+        assert radar.identity is not None
+        radar.settings = settings_of(radar.identity.model)
+        radar.values = self._read_all(radar)
+        radar.measuring = True  # unknown: it may have been left running
+        radar.differing = {}
+        wanted = self._wanted(radar)
+        if radar.options.config_mode == "push":
+            self._push(radar, wanted)
+        elif radar.options.config_mode == "check":
+            radar.differing |= {name: (value, radar.values[name])
+                                for name, value in wanted.items()}
+        self._start_or_stop(radar)
+
+    def _wanted(self, radar: Radar) -> dict[str, Value]:
+        """Return the wanted values, as the radar can hold them, that it does not have yet."""
+        wanted = {}
+        for name, value in radar.options.wanted.items():
+            if name in radar.settings:
+                try:
+                    checked = radar.settings[name].check(value)
+                except SettingError as error:
+                    radar.differing[name] = (value, radar.values[name])
+                    self._listener.on_note(radar, f"{error}; it stays as it is", warning=True)
+                else:
+                    if checked != radar.values[name]:
+                        wanted[name] = checked
+        return wanted
+
+    def _push(self, radar: Radar, wanted: Mapping[str, Value]) -> None:
+        """Write wanted settings together; where that is refused, each that is not refused."""
+        before = dict(radar.values)
+        try:
+            self.write(radar, wanted)
+        except (RefusedError, SettingError):
+            for name, value in wanted.items():
+                try:
+                    self.write(radar, {name: value})
+                except (RefusedError, SettingError) as error:
+                    radar.differing[name] = (value, radar.values[name])
+                    self._listener.on_note(radar, str(error), warning=True)
+        changed = [f"{name}: {radar.settings[name].text(before[name])} → "
+                   f"{radar.settings[name].text(radar.values[name])}"
+                   for name in wanted if radar.values[name] != before[name]]
+        if changed:
+            self._listener.on_note(radar, "wrote " + ", ".join(changed))
+
+    def _start_or_stop(self, radar: Radar) -> None:
+        wanted = self._active and radar.enabled
+        if not wanted:
+            self._stop(radar)
+        else:
+            self._execute(radar, commands.START)
+            radar.measuring = True
+        radar.arrivals.clear()
+        radar.due = 0.0
+
+    def _stop(self, radar: Radar) -> None:
+        if radar.measuring:
+            self._execute(radar, commands.STOP)
+            radar.measuring = False
+
+    @contextlib.contextmanager
+    def _stopped_for(self, radar: Radar, changes: Iterable[str]) -> Iterator[None]:
+        """Stop the acquisition around changes that need it."""
+        needed = radar.measuring and any(
+            radar.settings[name].needs_stop for name in changes if name in radar.settings)
+        if needed:
+            self._stop(radar)
+        try:
+            yield
+        finally:
+            if needed:
+                radar.measuring = True
+                self._start_or_stop(radar)
+
+    # --- measuring ---
+
+    def _measure(self, radar: Radar) -> None:
+        """Read one target list, and what else was asked for."""
+        assert radar.identity is not None
+        model, link = radar.identity.model, self._open_link()
+        resolution = radar.resolution(link.baud_rate)
+        self._parser.fixed_targets = radar.fixed_targets if resolution.fixed_length else None
+        request = commands.read_target_list(radar.address, radar.options.output, resolution)
+        size = LINE_OVERHEAD + 14 * radar.max_targets
+        timeout = max(model.timeout, 1.1 * radar.cycle_time) + LATENCY + link.seconds(size)
+        targets, stamp = self._exchange(
+            radar, request, lambda frame: decode_target_list(frame, model.range_step_16), timeout,
+            attempts=1)
+        radar.fixed_targets = self._parser.fixed_targets or 0
+        radar.count_list(time.monotonic(), clipping=targets.clipping)
+        self._listener.on_target_list(radar, targets, stamp)
+        if radar.options.read_range_list and model.supports(commands.READ_RANGE_LIST):
+            range_list, stamp = self._timed(radar, commands.READ_RANGE_LIST, timeout)
+            self._listener.on_range_list(radar, range_list, stamp)
+        if radar.options.read_digital_outputs and model.supports(commands.READ_DIGITAL_OUTPUTS):
+            outputs, stamp = self._timed(radar, commands.READ_DIGITAL_OUTPUTS, timeout)
+            self._listener.on_digital_outputs(radar, outputs, stamp)
+
+    def _keep_alive(self, radar: Radar) -> None:
+        """Check that a radar which is not measuring is there; read what it has to tell."""
+        assert radar.identity is not None
+        radar.due = time.monotonic() + KEEP_ALIVE
+        temperatures = {"dsp": commands.READ_DSP_TEMPERATURE, "rfe": commands.READ_RFE_TEMPERATURE}
+        model = radar.identity.model
+        if not model.supports(commands.READ_DSP_TEMPERATURE):
+            self._execute(radar, commands.READ_ADDRESS)
+            return
+        stamp = 0
+        for name, command in temperatures.items():
+            radar.temperatures[name], stamp = self._timed(radar, command)
+        self._listener.on_temperatures(radar, stamp)
+
+    # --- requests ---
+
+    @contextlib.contextmanager
+    def _link_errors_noted(self) -> Iterator[None]:
+        try:
+            yield
+        except LinkError as error:
+            self.link_error = error
+            raise
+
+    def _open_link(self) -> SerialLink:
+        if self._link is None:
+            raise LinkError(f"{self.port} is not open")
+        return self._link
+
+    def _require(self, radar: Radar) -> Model:
+        if radar.identity is None:
+            reason = self.link_error or radar.error
+            raise NoAnswerError(f"{radar.name} is not connected" + (f": {reason}" if reason else ""))
+        return radar.identity.model
+
+    def _baud_candidates(self, radar: Radar) -> tuple[int, ...]:
+        if self._baud_rate:
+            return (self._baud_rate,)
+        if self._link is not None and any(other.identity for other in self.devices):
+            return (self._link.baud_rate,)
+        if radar.options.model is not None:
+            return (radar.options.model.baud_rate,)
+        return BAUD_RATES
+
+    def _ask_address(self, radar: Radar) -> int:
+        """Ask for the address by broadcast; one sensor on the line may answer (3.3.4.1)."""
+        frames = self._broadcast()
+        addresses = sorted({frame.source for frame in frames})
+        if len(addresses) > 1:
+            raise WrongDeviceError(
+                f"several sensors answer ({', '.join(map(str, addresses))}); say which one with "
+                "the parameter address, or name all of them with the parameter sensors")
+        if not addresses:
+            raise NoAnswerError(f"no sensor answers on {self.port} at {self.baud_rate} Bd")
+        return addresses[0]
+
+    def _broadcast(self) -> list[Frame]:
+        """Return all answers to the question for the address."""
+        link = self._open_link()
+        self._discard_input()
+        link.write(commands.READ_ADDRESS.request(BROADCAST).encode())
+        frames: list[Frame] = []
+        end = time.monotonic() + REPLY_TIMEOUT + LATENCY
+        while (remaining := end - time.monotonic()) > 0:
+            found = list(self._parser.feed(link.read(remaining)))
+            if found:
+                frames += [frame for frame in found if frame.destination == MASTER
+                           and frame.function_code == commands.READ_SENSOR]
+                end = min(end, time.monotonic() + BROADCAST_WINDOW)
+        return frames
+
+    def _explained(self, radar: Radar, error: DriverError) -> DriverError:
+        """Add to "no answer" what could be found out about the reason."""
+        if not isinstance(error, (NoAnswerError, FrameError)) or len(self.devices) > 1:
+            return error
+        hint = self._other_sensor(radar)
+        where = f"at address {radar.options.address} " if radar.options.address else ""
+        rates = " or ".join(str(rate) for rate in self._baud_candidates(radar))
+        return NoAnswerError(f"no answer {where}on {self.port} at {rates} Bd{hint}")
+
+    def _other_sensor(self, radar: Radar) -> str:
+        """Look for a sensor at other addresses and baud rates."""
+        link = self._open_link()
+        configured = link.baud_rate
+        damaged = self._parser.damaged_frames + self._parser.dropped_bytes
+        try:
+            for baud_rate in dict.fromkeys((*self._baud_candidates(radar), *BAUD_RATES)):
+                link.baud_rate = baud_rate
+                frames = self._broadcast()
+                if frames:
+                    return (f", but a sensor answers at address {frames[0].source} and "
+                            f"{baud_rate} Bd; correct the parameters address and serial_baud")
+        finally:
+            link.baud_rate = configured
+        if self._parser.damaged_frames + self._parser.dropped_bytes > damaged:
+            return ("; bytes arrive that are no iSYS frames: check the wiring, and that nothing "
+                    "else talks on this line")
+        return "; check power, wiring (RS-485: A and B swapped?) and the address"
+
+    def _identify(self, radar: Radar) -> Identity:
+        radar.stale_replies_possible = False  # its name is the first thing asked for
+        device_name, _ = self._timed(radar, commands.READ_DEVICE_NAME, attempts=1)
+        model = model_of_product(self._execute(radar, commands.READ_PRODUCT_INFORMATION))
+        firmware = self._execute(radar, commands.READ_FIRMWARE_VERSION)
+        return Identity(model.with_firmware(firmware.number), device_name, firmware, *(
+            self._if_supported(radar, command) for command in (
+                commands.READ_DSP_HARDWARE_VERSION, commands.READ_RFE_HARDWARE_VERSION,
+                commands.READ_BOOTLOADER_VERSION)))
+
+    def _if_supported(self, radar: Radar, command: Command[T]) -> T | None:
+        """Return the result, or None where older firmware refuses (section 3.3.6.5)."""
+        try:
+            return self._execute(radar, command)
+        except RefusedError:
+            return None
+
+    def _read_all(self, radar: Radar) -> dict[str, Value]:
+        """Read all settings; those that the firmware refuses to tell are not offered."""
+        records: dict[Record, list[Setting]] = {}
+        for setting in radar.settings.values():
+            records.setdefault(setting.record, []).append(setting)
+        values: dict[str, Value] = {}
+        for settings in records.values():
+            try:
+                values |= read_settings(_Access(self, radar), settings)
+            except RefusedError:
+                names = ", ".join(setting.name for setting in settings)
+                self._listener.on_note(radar, f"this firmware has no {names}", warning=True)
+                for setting in settings:
+                    del radar.settings[setting.name]
+        return values
+
+    def _execute(self, radar: Radar, command: Command[T], timeout: float = 0.0) -> T:
+        return self._timed(radar, command, timeout)[0]
+
+    def _timed(self, radar: Radar, command: Command[T], timeout: float = 0.0,
+               attempts: int = ATTEMPTS) -> tuple[T, int]:
+        if not timeout:
+            writes_eeprom = command.function_code == commands.SAVE_ALL_SETTINGS.function_code
+            timeout = EEPROM_TIMEOUT if writes_eeprom else REPLY_TIMEOUT
+        try:
+            return self._exchange(radar, command.request(radar.address),
+                                  lambda frame: command.decode(frame.pdu), timeout,
+                                  attempts=attempts)
+        except RefusedError as error:
+            raise RefusedError(f"cannot {command.name}: {error}") from None
+
+    def read_record(self, radar: Radar, record: IsysRecord, location: Location) -> tuple[Raw, ...]:
+        """Return the raw fields of a settings record."""
+        return self._exchange(radar, record.read_request(radar.address, location),
+                              lambda frame: record.decode_reply(frame.pdu, location),
+                              REPLY_TIMEOUT)[0]
+
+    def write_record(self, radar: Radar, record: IsysRecord, values: tuple[Raw, ...]) -> None:
+        """Write the raw fields of a settings record to the RAM."""
+        self._exchange(radar, record.write_request(radar.address, values), _acknowledged,
+                       REPLY_TIMEOUT + EEPROM_TIMEOUT)
+
+    def _exchange(self, radar: Radar, request: Frame, decode: Callable[[Frame], T], timeout: float,
+                  sources: tuple[int, ...] = (), attempts: int = ATTEMPTS) -> tuple[T, int]:
+        """Send a request, again where its reply is lost, and return the decoded reply.
+
+        Args:
+            radar: The radar that is asked.
+            request: The request.
+            decode: Turns the reply into a value; raises FrameError where it does not fit.
+            timeout: Time in s until the reply begins.
+            sources: Addresses that may answer, if others than the one that was asked.
+            attempts: How often to ask.
+
+        Returns:
+            What `decode` made of the reply, and the host's time in ns when the reply began.
+
+        Raises:
+            RefusedError: The device answered with a failure.
+            FrameError: Only replies came that `decode` does not accept.
+            NoAnswerError: Nothing came in time.
+            LinkError: The port failed.
+        """
+        for _ in range(attempts - 1):
+            with contextlib.suppress(NoAnswerError, FrameError):
+                return self._exchange_once(radar, request, decode, timeout, sources)
+        return self._exchange_once(radar, request, decode, timeout, sources)
+
+    def _exchange_once(self, radar: Radar, request: Frame, decode: Callable[[Frame], T],
+                       timeout: float, sources: tuple[int, ...]) -> tuple[T, int]:
+        """Do one attempt of `_exchange`.
+
+        Replies carry the function code alone, not what was asked for: after a time-out a late
+        reply could pass for the answer to the next request. So that one is preceded by a request
+        for the device name, whose reply cannot be mistaken, and all before it is discarded.
+        """
+        barrier = commands.READ_DEVICE_NAME
+        if radar.stale_replies_possible and request.function_code != barrier.function_code:
+            self._exchange_once(radar, barrier.request(radar.address), lambda frame: None,
+                                REPLY_TIMEOUT + timeout, ())
+        self._discard_input()
+        link = self._open_link()
+        link.write(request.encode())
+        sources = sources or (request.destination,)
+        unacceptable: FrameError | None = None
+        for frame, stamp in self._frames(timeout + link.seconds(len(request.pdu) + LINE_OVERHEAD)):
+            if frame == request:
+                continue  # the line's echo of ourselves
+            if (frame.destination != MASTER or frame.source not in sources
+                    or frame.function_code not in (request.function_code, FAILURE)):
+                self.stale_frames += 1
+                continue
+            radar.stale_replies_possible = False
+            if frame.function_code == FAILURE:
+                radar.statistics.refusals += 1
+                raise RefusedError(f"{radar.name} answers with failure (0xFD): not possible in "
+                                   "its present state, or a value that it does not allow")
+            try:
+                return decode(frame), stamp
+            except FrameError as error:
+                unacceptable = error
+        radar.stale_replies_possible = True
+        raise unacceptable or NoAnswerError(
+            f"{radar.name} does not answer on {self.port} at {link.baud_rate} Bd")
+
+    def _frames(self, timeout: float) -> Iterator[tuple[Frame, int]]:
+        """Yield the frames that arrive in time, each with the host time in ns at its first byte.
+
+        A reply that has begun may finish, as long as its bytes keep coming.
+        """
+        link = self._open_link()
+        deadline = time.monotonic() + timeout
+        stamp = 0
+        while (remaining := deadline - time.monotonic()) > 0:
+            data = link.read(remaining)
+            if not data:
+                break
+            if not self._parser.pending:
+                stamp = time.time_ns() - round(link.seconds(len(data)) * 1e9)
+            for frame in self._parser.feed(data):
+                yield frame, stamp
+            if self._parser.pending:
+                deadline = max(deadline, time.monotonic() + BYTE_GAP)
+        for frame in self._parser.flush():
+            yield frame, stamp
+
+    def _discard_input(self) -> None:
+        """Drop what arrived unasked, so that it cannot pass for a reply."""
+        waiting = self._open_link().read(0)
+        self.stale_frames += sum(1 for _ in self._parser.feed(waiting))
+        self.stale_frames += sum(1 for _ in self._parser.flush())
+
+
+def _acknowledged(frame: Frame) -> None:
+    if frame.pdu:
+        raise FrameError(f"acknowledge carries {len(frame.pdu)} bytes: {frame}")
+
+
+def _record(setting: Setting) -> IsysRecord:
+    assert isinstance(setting.record, IsysRecord)
+    return setting.record
+
+
+class _Access:
+    """The records of one radar, for `read_settings` and `write_settings`."""
+
+    def __init__(self, bus: RadarBus, radar: Radar, location: Location = Location.RAM) -> None:
+        self._bus = bus
+        self._radar = radar
+        self._location = location
+
+    def read_record(self, record: Record) -> tuple[Raw, ...]:
+        """Return the raw fields of a record."""
+        assert isinstance(record, IsysRecord)
+        return self._bus.read_record(self._radar, record, self._location)
+
+    def write_record(self, record: Record, values: tuple[Raw, ...]) -> None:
+        """Write all fields of a record."""
+        assert isinstance(record, IsysRecord)
+        self._bus.write_record(self._radar, record, values)

@@ -1,0 +1,1 @@
+"""Plain values in, ROS messages out; knows no device."""

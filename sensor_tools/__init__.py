@@ -1,0 +1,1 @@
+"""Tools around the drivers: simulators and the demonstration."""
