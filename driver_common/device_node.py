@@ -76,6 +76,9 @@ class DeviceNode(LifecycleNode):
         """Create the publishers and services of a sensor that do not depend on its model."""
         raise NotImplementedError
 
+    def add_device_interfaces(self, device: Any) -> None:
+        """Create the publishers that depend on what the device is."""
+
     def status_of(self, device: Any) -> DiagnosticStatus:
         """Return the diagnostics of a device."""
         raise NotImplementedError
@@ -161,10 +164,11 @@ class DeviceNode(LifecycleNode):
         for name, setting in settings.items():
             self.store.declare(prefix + name, setting, values[name])
             self._devices[prefix + name] = device
+        self.add_device_interfaces(device)
         lacking = [name for name in self.wanted_settings(sensor) if name not in settings]
         for name in lacking:
-            self.get_logger().warning(f"parameter {prefix}{name}: the {device.model.name} has no "
-                                      "such setting; it is ignored")
+            self.get_logger().warning(f"parameter {prefix}{name}: the {device.product} has no such "
+                                      "setting; it is ignored")
 
     def set_parameters_atomically(
             self, parameter_list: list[RosParameter]) -> SetParametersResult:

@@ -30,6 +30,13 @@ from msg_conversions.temperature import to_temperature
 
 SIMULATED = "sim://"
 RESOLUTIONS = {"auto": 0, "16": 16, "32": 32}
+MODEL_TOPICS = (
+    (commands.READ_RANGE_LIST, Range, ("range",)),
+    (commands.READ_RANGE_LIST, Temperature, ("temperature",)),
+    (commands.READ_DSP_TEMPERATURE, Temperature, ("dsp_temperature", "rfe_temperature")),
+    (commands.READ_DIGITAL_OUTPUTS, Float32MultiArray, ("digital_outputs",)),
+    (commands.READ_RAW, Float32MultiArray, ("raw_signals",)),
+)
 PWM_STEP = 0.01  # m or m/s, table 35
 
 
@@ -123,11 +130,7 @@ class IsysRadarNode(DeviceNode, Listener):
 
     def make_interfaces(self, sensor: str) -> None:
         """Create topics and services of a sensor."""
-        self._publishers_of[sensor] = {name: self.add_publisher(kind, sensor, name)
-                                       for name, kind in (
-            ("points", PointCloud2), ("range", Range), ("temperature", Temperature),
-            ("dsp_temperature", Temperature), ("rfe_temperature", Temperature),
-            ("digital_outputs", Float32MultiArray), ("raw_signals", Float32MultiArray))}
+        self._publishers_of[sensor] = {"points": self.add_publisher(PointCloud2, sensor, "points")}
         for name, action in (
                 ("start_acquisition", lambda radar: self._enable(radar, True)),
                 ("stop_acquisition", lambda radar: self._enable(radar, False)),
@@ -143,6 +146,15 @@ class IsysRadarNode(DeviceNode, Listener):
                 ("change_address", self._change_address),
                 ("read_raw_signals", self._read_raw_signals)):
             self.add_trigger(sensor, name, lambda action=action: action(self._radar(sensor)))
+
+    def add_device_interfaces(self, radar: Radar) -> None:
+        """Create the topics that the radar's model can serve."""
+        publishers = self._publishers_of[radar.options.name]
+        for command, kind, names in MODEL_TOPICS:
+            if radar.model is not None and radar.model.supports(command):
+                for name in names:
+                    if name not in publishers:
+                        publishers[name] = self.add_publisher(kind, radar.options.name, name)
 
     def _radar(self, sensor: str) -> Radar:
         radar: Radar = next(radar for radar in self.bus.devices if radar.options.name == sensor)
@@ -213,8 +225,9 @@ class IsysRadarNode(DeviceNode, Listener):
                           to_temperature(celsius, *self._frame_and_stamp(radar, stamp)))
 
     def _publish(self, radar: Radar, topic: str, message: Any) -> None:
-        if self.context.ok():
-            self._publishers_of[radar.options.name][topic].publish(message)
+        publisher = self._publishers_of[radar.options.name].get(topic)
+        if publisher is not None and self.context.ok():
+            publisher.publish(message)
 
     def _frame_and_stamp(self, radar: Radar, stamp: int) -> tuple[str, int]:
         sensor = radar.options.name

@@ -191,6 +191,11 @@ class Radar:
         return self.identity.model if self.identity else None
 
     @property
+    def product(self) -> str:
+        """Name of what is connected."""
+        return self.model.name if self.model else "radar"
+
+    @property
     def cycle_time(self) -> float:
         """Cycle time in s in the present measurement mode."""
         if self.model is None:
