@@ -1,0 +1,37 @@
+"""Build and install the package; colcon calls this (build type ament_python)."""
+
+from glob import glob
+
+from setuptools import find_packages, setup
+
+PACKAGE = "industrial_sensor_drivers"
+SHARE = f"share/{PACKAGE}"
+
+setup(
+    name=PACKAGE,
+    version="0.1.0",  # the same as in package.xml, like all that is said here about the package
+    description=(
+        "Drivers for InnoSenT iSYS radars, ICOtronic wireless accelerometers"
+        " and Pepperl+Fuchs UC4000 ultrasonic sensors."
+    ),
+    maintainer=f"{PACKAGE} maintainers",
+    maintainer_email="maintainers@example.com",
+    license="Apache-2.0",
+    python_requires=">=3.10",
+    extras_require={"test": ["pytest"]},  # tells "colcon test" to call pytest
+    packages=find_packages(exclude=["test", "test.*", "bench", "bench.*"]),
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
+        (SHARE, ["package.xml"]),
+        (f"{SHARE}/launch", sorted(glob("launch/*.py"))),
+        (f"{SHARE}/config", sorted(glob("config/*.yaml"))),
+        (f"{SHARE}/rviz", sorted(glob("rviz/*.rviz"))),
+    ],
+    entry_points={
+        "console_scripts": [
+            "demo = sensor_tools.demo:main",
+            "isys_radar_node = isys_radar_driver.node:main",
+            "simulate = sensor_tools.simulate:main",
+        ],
+    },
+)

@@ -1,0 +1,14 @@
+"""The environment of every test. It must be in place before rclpy is first imported."""
+
+import atexit
+import os
+import shutil
+import tempfile
+
+log_directory = tempfile.mkdtemp(prefix="ros-log-")
+atexit.register(shutil.rmtree, log_directory, ignore_errors=True)
+
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+os.environ.setdefault("ROS_DOMAIN_ID", str(os.getpid() % 100 + 1))  # own to this run
+os.environ["ROS_LOG_DIR"] = log_directory
+os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"  # a field of the wrong type is an error, not a crash
