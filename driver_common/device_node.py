@@ -142,9 +142,8 @@ class DeviceNode(LifecycleNode):
     def wanted_settings(self, sensor: str) -> dict[str, Value]:
         """Return the device settings that the user gave for a sensor."""
         prefix = self.prefix(sensor)
-        return {name[len(prefix):]: value for name, value in self.store.overrides.items()
-                if name.startswith(prefix)
-                and name[len(prefix):] in self.ALL_SETTINGS}  # type: ignore[misc]
+        return {name: self.store.overrides[prefix + name] for name in self.ALL_SETTINGS
+                if prefix + name in self.store.overrides}
 
     def show_settings(self, sensor: str, device: Any) -> None:
         """Declare a device's settings with the values that it reported; from any thread."""

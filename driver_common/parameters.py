@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 from rcl_interfaces.msg import (
     FloatingPointRange,
@@ -64,7 +65,7 @@ class ParameterStore:
         """Take the overrides, which the node has declared by itself."""
         self._node = node
         self.rows: dict[str, Parameter] = {}
-        self.overrides: dict[str, object] = {}
+        self.overrides: dict[str, Any] = {}
         for name, parameter in node.get_parameters_by_prefix("").items():
             if not name.startswith(("qos_overrides.", "use_sim_time", "start_type_description")):
                 self.overrides[name] = parameter.value

@@ -232,7 +232,7 @@ class Setting(Parameter):
         if self.wire not in "fd":
             return round(raw)
         try:
-            return float(struct.unpack(self.wire, struct.pack(self.wire, raw))[0])
+            return float(struct.unpack("<" + self.wire, struct.pack("<" + self.wire, raw))[0])
         except OverflowError:
             raise SettingError(f"{self.name} = {self.text(checked)} is out of range, it must fit "
                                f"a 32-bit floating-point number") from None
@@ -259,7 +259,7 @@ def _shortest_float32(value: float) -> float:
     for digits in range(6, 9):
         short = float(f"{value:.{digits}g}")
         try:
-            if struct.pack("f", short) == struct.pack("f", value):
+            if struct.pack("<f", short) == struct.pack("<f", value):
                 return short
         except OverflowError:
             return value

@@ -55,8 +55,9 @@ class Frame:
     delimiter: Delimiter = Delimiter.SD2
 
     def __str__(self) -> str:
-        """Return the bytes in hexadecimal."""
-        return self.encode().hex(" ").upper()
+        """Return the form and the bytes from DA to the PDU in hexadecimal."""
+        body = bytes((self.destination, self.source, self.function_code)) + self.pdu
+        return f"{self.delimiter.name} {body.hex(' ').upper()}"
 
     def encode(self) -> bytes:
         """Return the bytes on the wire.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -29,6 +29,8 @@ from msg_conversions.range import to_range
 from msg_conversions.temperature import to_temperature
 
 SIMULATED = "sim://"
+POSITIVE_VELOCITY = {"approaching": -1, "receding": 1}  # to the sign of ROS (errata I20)
+POSITIVE_ANGLE = {"left": 1, "right": -1}  # errata I21
 RESOLUTIONS = {"auto": 0, "16": 16, "32": 32}
 MODEL_TOPICS = (
     (commands.READ_RANGE_LIST, Range, ("range",)),
@@ -64,10 +66,10 @@ class IsysRadarNode(DeviceNode, Listener):
         Option("time_offset", kind=float, default=0.0, unit="s", live=True,
                description="Added to every stamp; negative where the measurement was earlier"),
         Option("positive_velocity", kind=str, default="approaching", live=True,
-               choices={"approaching": -1, "receding": 1},
+               choices=POSITIVE_VELOCITY,
                description="What the device means by a positive velocity"),
         Option("positive_angle", kind=str, default="left", live=True,
-               choices={"left": 1, "right": -1},
+               choices=POSITIVE_ANGLE,
                description="What the device means by a positive angle"),
         Option("publish_range_list", kind=bool, default=False, live=True,
                description="Read the range list after every target list and publish ~/range and "
@@ -145,7 +147,10 @@ class IsysRadarNode(DeviceNode, Listener):
                 ("set_default_temperature_thresholds", self._set_default_thresholds),
                 ("change_address", self._change_address),
                 ("read_raw_signals", self._read_raw_signals)):
-            self.add_trigger(sensor, name, lambda action=action: action(self._radar(sensor)))
+            self._add_service(sensor, name, action)
+
+    def _add_service(self, sensor: str, name: str, action: Callable[[Radar], str]) -> None:
+        self.add_trigger(sensor, name, lambda: action(self._radar(sensor)))
 
     def add_device_interfaces(self, radar: Radar) -> None:
         """Create the topics that the radar's model can serve."""
@@ -194,9 +199,8 @@ class IsysRadarNode(DeviceNode, Listener):
     def on_target_list(self, radar: Radar, targets: TargetList, stamp: int) -> None:
         """Publish the targets as points."""
         sensor = radar.options.name
-        angle_sign, velocity_sign = (
-            self.store.rows[self.prefix(sensor) + name].choices[self.option(name, sensor)]
-            for name in ("positive_angle", "positive_velocity"))
+        angle_sign = POSITIVE_ANGLE[self.option("positive_angle", sensor)]
+        velocity_sign = POSITIVE_VELOCITY[self.option("positive_velocity", sensor)]
         self._publish(radar, "points", to_point_cloud(
             [(target.range, angle_sign * target.angle, velocity_sign * target.velocity,
               target.signal) for target in targets.targets],

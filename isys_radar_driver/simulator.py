@@ -12,12 +12,12 @@ import statistics
 import struct
 import time
 from collections.abc import Callable, Iterable, Sequence
-from typing import cast
+from typing import Any, ClassVar, cast
 
 import numpy as np
 
 from driver_common.errors import SettingError
-from driver_common.settings import Raw, Record, Setting, Value
+from driver_common.settings import Raw, Setting, Value
 from driver_common.simulated_line import SimulatedLine
 from isys_radar_driver import commands
 from isys_radar_driver.commands import IsysRecord, Location
@@ -35,7 +35,13 @@ from isys_radar_driver.frames import (
 )
 from isys_radar_driver.models import FAST, Model, find_model
 from isys_radar_driver.settings import is_application_setting, settings_of
-from isys_radar_driver.targets import FIXED_LENGTH, Resolution, Target, TargetList, encode_target_list
+from isys_radar_driver.targets import (
+    FIXED_LENGTH,
+    Resolution,
+    Target,
+    TargetList,
+    encode_target_list,
+)
 
 TURNAROUND = 0.001  # s from the end of a request to the reply
 BOOT_TIME = 0.5  # s without answers after power-on
@@ -269,8 +275,7 @@ class SimulatedRadar:
             other = self.settings.get(setting.name.replace(here, there))
             if here in setting.name and other is not None and other.record != setting.record:
                 limit = self.value(other.name)
-                assert isinstance(value, (int, float)) and isinstance(limit, (int, float))
-                if sign * value > sign * limit:
+                if sign * cast(float, value) > sign * cast(float, limit):
                     raise Refusal
 
     def _read_calibration(self, pdu: bytes, now: float) -> bytes:
@@ -380,11 +385,13 @@ class SimulatedRadar:
         velocities = limits("velocity_{}")
         direction = (self.value(f"output{output}.direction")
                      if f"output{output}.direction" in self.settings else "both")
-        passed = [target for target in self.scene(now)
-                  if within(target.range, ranges) and within(target.signal, signals)
-                  and within(abs(target.velocity), velocities)
-                  and (direction == "both" or (target.velocity > 0) == (direction == "approaching"))]
-        return self._single_target(output, passed)
+        def on_course(target: Target) -> bool:
+            return direction == "both" or (target.velocity > 0) == (direction == "approaching")
+
+        return self._single_target(output, [
+            target for target in self.scene(now)
+            if within(target.range, ranges) and within(target.signal, signals)
+            and within(abs(target.velocity), velocities) and on_course(target)])
 
     def _single_target(self, output: int, targets: list[Target]) -> list[Target]:
         signal = self.value(f"output{output}.filter_signal")
@@ -395,14 +402,16 @@ class SimulatedRadar:
             return [max(targets, key=lambda target: target.signal)]
         attribute = "velocity" if signal == "velocity" else "range"
         values = [getattr(target, attribute) for target in targets]
-        wanted = {"mean": statistics.fmean, "median": statistics.median_low,
-                  "min": min, "max": max}[str(kind)](values)
+        reduce: Callable[[list[float]], float] = {
+            "mean": statistics.fmean, "median": statistics.median_low,
+            "min": min, "max": max}[str(kind)]
+        wanted = reduce(values)
         nearest = min(targets, key=lambda target: abs(getattr(target, attribute) - wanted))
         return [nearest._replace(**{attribute: wanted})]
 
     # --- helpers ---
 
-    def _require(self, command: commands.Command[object] | commands.Command[None]) -> None:
+    def _require(self, command: commands.Command[Any]) -> None:
         if not self.model.supports(command):
             raise Refusal
 
@@ -440,7 +449,7 @@ class SimulatedRadar:
                 return setting.encode(setting.limits[1] if value == math.inf else value)
         return setting.encode(setting.minimum) if setting.minimum is not None else 0
 
-    _HANDLERS: dict[int, Callable[[SimulatedRadar, bytes, float], bytes]] = {
+    _HANDLERS: ClassVar[dict[int, Callable[[SimulatedRadar, bytes, float], bytes]]] = {
         0xD0: _read_device_name, 0xD1: _command,
         commands.READ_SENSOR: _read_sensor, commands.READ_SENSOR + 1: _write_sensor,
         commands.READ_APPLICATION: _read_application,
