@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 
@@ -51,10 +52,9 @@ class SerialLink:
                 port, baud_rate, timeout=0, write_timeout=WRITE_TIMEOUT, exclusive=True)
         except (serial.SerialException, ValueError, OSError) as error:
             raise LinkError(f"cannot open {port}: {_reason(port, error)}") from error
-        try:
+        # Not on a pseudo-terminal, a socket, or with every driver.
+        with contextlib.suppress(AttributeError, ValueError, OSError, NotImplementedError):
             self._serial.set_low_latency_mode(True)
-        except (AttributeError, ValueError, OSError, NotImplementedError):
-            pass  # a pseudo-terminal, a socket or a driver without it
 
     @property
     def baud_rate(self) -> int:
@@ -93,10 +93,8 @@ class SerialLink:
 
     def close(self) -> None:
         """Close the port; it may be gone already."""
-        try:
+        with contextlib.suppress(OSError):  # unplugged
             self._serial.close()
-        except (OSError, serial.SerialException):
-            pass  # unplugged
 
 
 class _Guard:

@@ -19,7 +19,8 @@ from driver_common.simulated_line import SimulatedLine
 from isys_radar_driver import commands
 from isys_radar_driver.commands import Command, RangeList
 from isys_radar_driver.models import find_model
-from isys_radar_driver.session import Listener, Options, Radar, RadarBus
+from isys_radar_driver.radar import Options, Radar
+from isys_radar_driver.session import Listener, RadarBus
 from isys_radar_driver.settings import ALL_SETTINGS
 from isys_radar_driver.simulator import simulated_line
 from isys_radar_driver.targets import TargetList
@@ -170,7 +171,7 @@ class IsysRadarNode(DeviceNode, Listener):
     def on_found(self, radar: Radar) -> None:
         """Show the radar's settings as parameters."""
         self.get_logger().info(f"{self._title(radar)}: connected to {radar.identity}, address "
-                               f"{radar.address}, {self.bus.baud_rate} Bd")
+                               f"{radar.address}, {self.bus.line.baud_rate} Bd")
         assert radar.model is not None
         if not radar.model.has_target_lists:
             self.get_logger().warning(
@@ -293,7 +294,8 @@ class IsysRadarNode(DeviceNode, Listener):
     def status_of(self, radar: Radar) -> DiagnosticStatus:
         """Return identity, link, rate, errors, temperatures and differing settings."""
         identity, counts = radar.identity, radar.statistics
-        values: dict[str, object] = {"port": self.bus.port, "baud rate": self.bus.baud_rate,
+        line = self.bus.line
+        values: dict[str, object] = {"port": line.port, "baud rate": line.baud_rate,
                                      "address": radar.address}
         if identity is not None:
             values |= {
@@ -306,8 +308,9 @@ class IsysRadarNode(DeviceNode, Listener):
             "target lists": counts.target_lists, "lost cycles": counts.lost_cycles,
             "clippings": counts.clippings, "time-outs": counts.timeouts,
             "refusals": counts.refusals, "connections": counts.connections,
-            "damaged frames": self.bus.damaged_frames, "dropped bytes": self.bus.dropped_bytes,
-            "stale frames": self.bus.stale_frames,
+            "damaged frames": line.parser.damaged_frames,
+            "dropped bytes": line.parser.dropped_bytes,
+            "stale frames": line.stale_frames,
             "unsaved settings": ", ".join(sorted(radar.unsaved))}
         values |= {f"{name} temperature [°C]": celsius
                    for name, celsius in radar.temperatures.items()}

@@ -8,12 +8,9 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
 from typing import TypeVar
 
-from driver_common.device_thread import Backoff
 from driver_common.errors import (
     DriverError,
     FrameError,
@@ -23,96 +20,28 @@ from driver_common.errors import (
     SettingError,
     WrongDeviceError,
 )
-from driver_common.serial_link import SerialLink
 from driver_common.settings import Raw, Record, Setting, Value, read_settings, write_settings
 from isys_radar_driver import commands
-from isys_radar_driver.commands import Command, IsysRecord, Location, RangeList, RawSignals, Version
+from isys_radar_driver.commands import Command, IsysRecord, Location, RangeList, RawSignals
 from isys_radar_driver.frames import (
     BROADCAST,
-    FAILURE,
     FIRST_ADDRESS,
     LAST_ADDRESS,
-    MASTER,
     Frame,
-    FrameParser,
 )
-from isys_radar_driver.models import BAUD_RATES, FAST, Model, model_of_product
+from isys_radar_driver.line import LATENCY, OVERHEAD, REPLY_TIMEOUT, Line
+from isys_radar_driver.models import BAUD_RATES, Model, model_of_product
+from isys_radar_driver.radar import Identity, Options, Radar
 from isys_radar_driver.settings import is_application_setting, settings_of
-from isys_radar_driver.targets import Resolution, TargetList, decode_target_list
+from isys_radar_driver.targets import TargetList, decode_target_list
 
 T = TypeVar("T")
 
-REPLY_TIMEOUT = 0.100  # s until the first byte of a reply that needs no measurement
-LATENCY = 0.050  # s, allowance for USB adapters and the host
 EEPROM_TIMEOUT = 1.0  # s, writing the EEPROM takes its time
 RAW_TIMEOUT = 3.0  # s until the first byte of raw signals
-BYTE_GAP = 0.100  # s that a reply which has begun may pause
 ATTEMPTS = 2
 MISSES_UNTIL_LOST = 3
 KEEP_ALIVE = 1.0  # s between requests to a radar that is not measuring
-BROADCAST_WINDOW = 0.060  # s in which further sensors may answer a broadcast
-LINE_OVERHEAD = 9  # bytes of an SD2 frame beside its PDU
-RATE_WINDOW = 5.0  # s over which the rate is measured
-
-
-@dataclass(frozen=True)
-class Identity:
-    """Who a radar says it is (sections 3.3.2 and 3.3.6)."""
-
-    model: Model
-    device_name: str
-    firmware: Version
-    dsp_hardware: Version | None
-    rfe_hardware: Version | None
-    bootloader: Version | None
-
-    @property
-    def serial_number(self) -> str:
-        """What follows the model in the device name (errata I23)."""
-        return self.device_name.removeprefix(self.model.name).strip(" ,:#") or "unknown"
-
-    def __str__(self) -> str:
-        """Return model, serial number and firmware."""
-        return f"{self.model.name} {self.serial_number}, firmware {self.firmware}"
-
-
-@dataclass
-class Statistics:
-    """What was counted for one radar since the start."""
-
-    target_lists: int = 0
-    lost_cycles: int = 0
-    clippings: int = 0
-    timeouts: int = 0
-    refusals: int = 0
-    connections: int = 0
-
-
-@dataclass
-class Options:
-    """How one radar is to be used.
-
-    Attributes:
-        name: Name on a line with several, "" for a single one.
-        address: Its address; 0 = ask by broadcast.
-        model: The only model that is accepted; None = any.
-        output: Output filter of the target lists, 1 to 3.
-        resolution: 16 or 32 bit; 0 = what fits the line.
-        wanted: Settings that the radar is to have.
-        config_mode: "push" writes them, "check" compares, "leave" ignores them.
-        read_digital_outputs: Read the digital outputs after every target list.
-        read_range_list: Read the range list after every target list.
-    """
-
-    name: str = ""
-    address: int = BROADCAST
-    model: Model | None = None
-    output: int = 1
-    resolution: int = 0
-    wanted: dict[str, Value] = field(default_factory=dict)
-    config_mode: str = "push"
-    read_digital_outputs: bool = False
-    read_range_list: bool = False
 
 
 class Listener:
@@ -143,125 +72,12 @@ class Listener:
         """Tell that the board temperatures of a radar were read."""
 
 
-class Radar:
-    """One radar on the line: what is known of it, and what was counted.
-
-    Attributes:
-        options: How it is to be used.
-        address: Its address, 0 while unknown.
-        identity: Who it is; None while it is not connected.
-        settings: The settings that it has, by name.
-        values: The values that it reported, by name.
-        temperatures: Board temperatures in °C, by name.
-        differing: Settings which are not as wanted: name to (wanted, reported).
-        error: Why it is not connected.
-        enabled: Whether acquisition is wanted, as far as the user of the services says.
-        measuring: Whether acquisition was started.
-    """
-
-    def __init__(self, options: Options) -> None:
-        """Begin as an unknown radar."""
-        self.options = options
-        self.address = options.address
-        self.identity: Identity | None = None
-        self.settings: dict[str, Setting] = {}
-        self.values: dict[str, Value] = {}
-        self.temperatures: dict[str, float] = {}
-        self.differing: dict[str, tuple[Value, Value]] = {}
-        self.unsaved: set[str] = set()
-        self.error: DriverError | None = None
-        self.enabled = True
-        self.measuring = False
-        self.statistics = Statistics()
-        self.arrivals: deque[float] = deque()
-        self.backoff = Backoff()
-        self.due = 0.0  # monotonic time of the next step
-        self.misses = 0
-        self.fixed_targets = 0  # learned length of fixed-length lists
-        self.stale_replies_possible = False
-
-    @property
-    def name(self) -> str:
-        """Name of the radar in messages."""
-        return self.options.name or (f"address {self.address}" if self.address else "radar")
-
-    @property
-    def model(self) -> Model | None:
-        """The connected model."""
-        return self.identity.model if self.identity else None
-
-    @property
-    def product(self) -> str:
-        """Name of what is connected."""
-        return self.model.name if self.model else "radar"
-
-    @property
-    def cycle_time(self) -> float:
-        """Cycle time in s in the present measurement mode."""
-        if self.model is None:
-            return 0.0
-        return self.model.cycle_time(self._mode)
-
-    @property
-    def _mode(self) -> int:
-        setting = self.settings.get("measurement_mode")
-        value = self.values.get("measurement_mode")
-        if setting is None or setting.choices is None:
-            return FAST
-        return setting.choices.get(str(value), FAST)
-
-    @property
-    def max_targets(self) -> int:
-        """Most targets in a list in the present measurement mode."""
-        if self.model is None:
-            return 0
-        return self.model.max_targets.get(self._mode, max(self.model.max_targets.values()))
-
-    @property
-    def rate(self) -> float:
-        """Measured target lists per second."""
-        arrivals = self.arrivals
-        if len(arrivals) < 2 or time.monotonic() - arrivals[-1] > RATE_WINDOW:
-            return 0.0
-        return (len(arrivals) - 1) / (arrivals[-1] - arrivals[0])
-
-    def resolution(self, baud_rate: int) -> Resolution:
-        """Return the resolution to ask for; "auto" takes the finest that fits the cycle (I24).
-
-        Raises:
-            SettingError: The model does not have the resolution that was asked for.
-        """
-        assert self.model is not None
-        bits = self.options.resolution
-        possible = [resolution for resolution in self.model.resolutions
-                    if not bits or resolution.bits == bits]
-        if not possible:
-            raise SettingError(f"{self.model.name} has no target lists of {bits} bit; set "
-                               "target_list_resolution to auto")
-        for resolution in possible:
-            size = LINE_OVERHEAD + self.max_targets * (14 if resolution.bits == 32 else 7)
-            if size * 10 / baud_rate < self.cycle_time:
-                return resolution
-        return possible[-1]
-
-    def count_list(self, now: float, *, clipping: bool) -> None:
-        """Count a target list, and the cycles that passed without one."""
-        self.statistics.target_lists += 1
-        self.statistics.clippings += clipping
-        if self.arrivals:
-            cycles = round((now - self.arrivals[-1]) / self.cycle_time)
-            self.statistics.lost_cycles += max(0, cycles - 1)
-        self.arrivals.append(now)
-        while now - self.arrivals[0] > RATE_WINDOW:
-            self.arrivals.popleft()
-
-
 class RadarBus:
     """Several radars on one serial line, or one.
 
     Attributes:
         devices: The radars, in the order of their turns.
-        stale_frames: Good frames that answered nothing.
+        line: The serial line.
         link_error: Why the port is not open.
     """
 
@@ -275,14 +91,11 @@ class RadarBus:
             radars: How each radar is to be used.
             listener: Told of everything that happens.
         """
-        self.port = port
+        self.line = Line(port)
         self.devices = [Radar(options) for options in radars]
-        self.stale_frames = 0
         self._baud_rate = baud_rate
         self._listener = listener
         self.link_error: LinkError | None = None
-        self._link: SerialLink | None = None
-        self._parser = FrameParser()
         self._active = False
         self._turn = 0
 
@@ -291,7 +104,7 @@ class RadarBus:
     def open(self) -> None:
         """Open the port; raises LinkError."""
         with self._link_errors_noted():
-            self._link = SerialLink(self.port, self._baud_candidates(self.devices[0])[0])
+            self.line.open(self._baud_candidates(self.devices[0])[0])
         self.link_error = None
         for radar in self.devices:
             radar.due = 0.0
@@ -312,32 +125,16 @@ class RadarBus:
 
     def close(self) -> None:
         """Leave the radars stopped and close the port."""
-        if self._link is None:
+        if not self.line.is_open:
             return
         for radar in self.devices:
             if radar.identity is not None:
                 with contextlib.suppress(DriverError):
                     self._stop(radar)
                 self._forget(radar)
-        self._link.close()
-        self._link = None
+        self.line.close()
 
     # --- what a user calls, through the thread ---
-
-    @property
-    def damaged_frames(self) -> int:
-        """Frames with a wrong checksum or end delimiter."""
-        return self._parser.damaged_frames
-
-    @property
-    def dropped_bytes(self) -> int:
-        """Bytes that belonged to no frame."""
-        return self._parser.dropped_bytes
-
-    @property
-    def baud_rate(self) -> int:
-        """Baud rate of the link in Bd, 0 while it is closed."""
-        return self._link.baud_rate if self._link else 0
 
     def set_active(self, active: bool) -> None:
         """Start or stop the acquisition of all radars, now and after every reconnection."""
@@ -499,7 +296,7 @@ class RadarBus:
 
     def _find(self, radar: Radar) -> None:
         """Find the radar at one of the possible baud rates, identify and configure it."""
-        link = self._open_link()
+        link = self.line.link
         failure: DriverError = NoAnswerError("no answer")
         for baud_rate in self._baud_candidates(radar):
             link.baud_rate = baud_rate
@@ -622,16 +419,16 @@ class RadarBus:
     def _measure(self, radar: Radar) -> None:
         """Read one target list, and what else was asked for."""
         assert radar.identity is not None
-        model, link = radar.identity.model, self._open_link()
+        model, link = radar.identity.model, self.line.link
         resolution = radar.resolution(link.baud_rate)
-        self._parser.fixed_targets = radar.fixed_targets if resolution.fixed_length else None
+        self.line.parser.fixed_targets = radar.fixed_targets if resolution.fixed_length else None
         request = commands.read_target_list(radar.address, radar.options.output, resolution)
-        size = LINE_OVERHEAD + 14 * radar.max_targets
+        size = OVERHEAD + 14 * radar.max_targets
         timeout = max(model.timeout, 1.1 * radar.cycle_time) + LATENCY + link.seconds(size)
         targets, stamp = self._exchange(
             radar, request, lambda frame: decode_target_list(frame, model.range_step_16), timeout,
             attempts=1)
-        radar.fixed_targets = self._parser.fixed_targets or 0
+        radar.fixed_targets = self.line.parser.fixed_targets or 0
         radar.count_list(time.monotonic(), clipping=targets.clipping)
         self._listener.on_target_list(radar, targets, stamp)
         if radar.options.read_range_list and model.supports(commands.READ_RANGE_LIST):
@@ -665,52 +462,34 @@ class RadarBus:
             self.link_error = error
             raise
 
-    def _open_link(self) -> SerialLink:
-        if self._link is None:
-            raise LinkError(f"{self.port} is not open")
-        return self._link
-
     def _require(self, radar: Radar) -> Model:
         if radar.identity is None:
             reason = self.link_error or radar.error
-            raise NoAnswerError(f"{radar.name} is not connected" + (f": {reason}" if reason else ""))
+            raise NoAnswerError(
+                f"{radar.name} is not connected: {reason or 'still searching'}")
         return radar.identity.model
 
     def _baud_candidates(self, radar: Radar) -> tuple[int, ...]:
         if self._baud_rate:
             return (self._baud_rate,)
-        if self._link is not None and any(other.identity for other in self.devices):
-            return (self._link.baud_rate,)
+        if self.line.is_open and any(other.identity for other in self.devices):
+            return (self.line.link.baud_rate,)
         if radar.options.model is not None:
             return (radar.options.model.baud_rate,)
         return BAUD_RATES
 
     def _ask_address(self, radar: Radar) -> int:
         """Ask for the address by broadcast; one sensor on the line may answer (3.3.4.1)."""
-        frames = self._broadcast()
+        frames = self.line.broadcast(commands.READ_ADDRESS.request(BROADCAST))
         addresses = sorted({frame.source for frame in frames})
         if len(addresses) > 1:
             raise WrongDeviceError(
                 f"several sensors answer ({', '.join(map(str, addresses))}); say which one with "
                 "the parameter address, or name all of them with the parameter sensors")
         if not addresses:
-            raise NoAnswerError(f"no sensor answers on {self.port} at {self.baud_rate} Bd")
+            raise NoAnswerError(f"no sensor answers on {self.line.port} at "
+                                f"{self.line.link.baud_rate} Bd")
         return addresses[0]
-
-    def _broadcast(self) -> list[Frame]:
-        """Return all answers to the question for the address."""
-        link = self._open_link()
-        self._discard_input()
-        link.write(commands.READ_ADDRESS.request(BROADCAST).encode())
-        frames: list[Frame] = []
-        end = time.monotonic() + REPLY_TIMEOUT + LATENCY
-        while (remaining := end - time.monotonic()) > 0:
-            found = list(self._parser.feed(link.read(remaining)))
-            if found:
-                frames += [frame for frame in found if frame.destination == MASTER
-                           and frame.function_code == commands.READ_SENSOR]
-                end = min(end, time.monotonic() + BROADCAST_WINDOW)
-        return frames
 
     def _explained(self, radar: Radar, error: DriverError) -> DriverError:
         """Add to "no answer" what could be found out about the reason."""
@@ -719,29 +498,28 @@ class RadarBus:
         hint = self._other_sensor(radar)
         where = f"at address {radar.options.address} " if radar.options.address else ""
         rates = " or ".join(str(rate) for rate in self._baud_candidates(radar))
-        return NoAnswerError(f"no answer {where}on {self.port} at {rates} Bd{hint}")
+        return NoAnswerError(f"no answer {where}on {self.line.port} at {rates} Bd{hint}")
 
     def _other_sensor(self, radar: Radar) -> str:
         """Look for a sensor at other addresses and baud rates."""
-        link = self._open_link()
+        link, parser = self.line.link, self.line.parser
         configured = link.baud_rate
-        damaged = self._parser.damaged_frames + self._parser.dropped_bytes
+        damaged = parser.damaged_frames + parser.dropped_bytes
         try:
             for baud_rate in dict.fromkeys((*self._baud_candidates(radar), *BAUD_RATES)):
                 link.baud_rate = baud_rate
-                frames = self._broadcast()
+                frames = self.line.broadcast(commands.READ_ADDRESS.request(BROADCAST))
                 if frames:
                     return (f", but a sensor answers at address {frames[0].source} and "
                             f"{baud_rate} Bd; correct the parameters address and serial_baud")
         finally:
             link.baud_rate = configured
-        if self._parser.damaged_frames + self._parser.dropped_bytes > damaged:
+        if parser.damaged_frames + parser.dropped_bytes > damaged:
             return ("; bytes arrive that are no iSYS frames: check the wiring, and that nothing "
                     "else talks on this line")
         return "; check power, wiring (RS-485: A and B swapped?) and the address"
 
     def _identify(self, radar: Radar) -> Identity:
-        radar.stale_replies_possible = False  # its name is the first thing asked for
         device_name, _ = self._timed(radar, commands.READ_DEVICE_NAME, attempts=1)
         model = model_of_product(self._execute(radar, commands.READ_PRODUCT_INFORMATION))
         firmware = self._execute(radar, commands.READ_FIRMWARE_VERSION)
@@ -801,93 +579,13 @@ class RadarBus:
 
     def _exchange(self, radar: Radar, request: Frame, decode: Callable[[Frame], T], timeout: float,
                   sources: tuple[int, ...] = (), attempts: int = ATTEMPTS) -> tuple[T, int]:
-        """Send a request, again where its reply is lost, and return the decoded reply.
-
-        Args:
-            radar: The radar that is asked.
-            request: The request.
-            decode: Turns the reply into a value; raises FrameError where it does not fit.
-            timeout: Time in s until the reply begins.
-            sources: Addresses that may answer, if others than the one that was asked.
-            attempts: How often to ask.
-
-        Returns:
-            What `decode` made of the reply, and the host's time in ns when the reply began.
-
-        Raises:
-            RefusedError: The device answered with a failure.
-            FrameError: Only replies came that `decode` does not accept.
-            NoAnswerError: Nothing came in time.
-            LinkError: The port failed.
-        """
-        for _ in range(attempts - 1):
-            with contextlib.suppress(NoAnswerError, FrameError):
-                return self._exchange_once(radar, request, decode, timeout, sources)
-        return self._exchange_once(radar, request, decode, timeout, sources)
-
-    def _exchange_once(self, radar: Radar, request: Frame, decode: Callable[[Frame], T],
-                       timeout: float, sources: tuple[int, ...]) -> tuple[T, int]:
-        """Do one attempt of `_exchange`.
-
-        Replies carry the function code alone, not what was asked for: after a time-out a late
-        reply could pass for the answer to the next request. So that one is preceded by a request
-        for the device name, whose reply cannot be mistaken, and all before it is discarded.
-        """
-        barrier = commands.READ_DEVICE_NAME
-        if radar.stale_replies_possible and request.function_code != barrier.function_code:
-            self._exchange_once(radar, barrier.request(radar.address), lambda frame: None,
-                                REPLY_TIMEOUT + timeout, ())
-        self._discard_input()
-        link = self._open_link()
-        link.write(request.encode())
-        sources = sources or (request.destination,)
-        unacceptable: FrameError | None = None
-        for frame, stamp in self._frames(timeout + link.seconds(len(request.pdu) + LINE_OVERHEAD)):
-            if frame == request:
-                continue  # the line's echo of ourselves
-            if (frame.destination != MASTER or frame.source not in sources
-                    or frame.function_code not in (request.function_code, FAILURE)):
-                self.stale_frames += 1
-                continue
-            radar.stale_replies_possible = False
-            if frame.function_code == FAILURE:
-                radar.statistics.refusals += 1
-                raise RefusedError(f"{radar.name} answers with failure (0xFD): not possible in "
-                                   "its present state, or a value that it does not allow")
-            try:
-                return decode(frame), stamp
-            except FrameError as error:
-                unacceptable = error
-        radar.stale_replies_possible = True
-        raise unacceptable or NoAnswerError(
-            f"{radar.name} does not answer on {self.port} at {link.baud_rate} Bd")
-
-    def _frames(self, timeout: float) -> Iterator[tuple[Frame, int]]:
-        """Yield the frames that arrive in time, each with the host time in ns at its first byte.
-
-        A reply that has begun may finish, as long as its bytes keep coming.
-        """
-        link = self._open_link()
-        deadline = time.monotonic() + timeout
-        stamp = 0
-        while (remaining := deadline - time.monotonic()) > 0:
-            data = link.read(remaining)
-            if not data:
-                break
-            if not self._parser.pending:
-                stamp = time.time_ns() - round(link.seconds(len(data)) * 1e9)
-            for frame in self._parser.feed(data):
-                yield frame, stamp
-            if self._parser.pending:
-                deadline = max(deadline, time.monotonic() + BYTE_GAP)
-        for frame in self._parser.flush():
-            yield frame, stamp
-
-    def _discard_input(self) -> None:
-        """Drop what arrived unasked, so that it cannot pass for a reply."""
-        waiting = self._open_link().read(0)
-        self.stale_frames += sum(1 for _ in self._parser.feed(waiting))
-        self.stale_frames += sum(1 for _ in self._parser.flush())
+        """Exchange a request with a radar, see `Line.exchange`."""
+        try:
+            return self.line.exchange(request, decode, timeout, sources=sources,
+                                      attempts=attempts)
+        except RefusedError:
+            radar.statistics.refusals += 1
+            raise
 
 
 def _acknowledged(frame: Frame) -> None:

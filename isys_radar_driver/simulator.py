@@ -11,7 +11,7 @@ import math
 import statistics
 import struct
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, ClassVar, cast
 
 import numpy as np
@@ -62,6 +62,10 @@ _FACTORY: Sequence[tuple[str, Value]] = (
     ("output2.temperature_threshold_celsius", 60.0), ("*.temperature_warning_celsius", 55.0),
     ("moving_target_sensitivity.*", 3.0), ("target_clustering", True),
 )
+
+_SINGLE_VALUE: Mapping[str, Callable[[list[float]], float]] = {
+    "mean": statistics.fmean, "median": statistics.median_low,
+    "min": lambda values: min(values), "max": lambda values: max(values)}
 
 Scene = Callable[[float], list[Target]]
 
@@ -402,10 +406,7 @@ class SimulatedRadar:
             return [max(targets, key=lambda target: target.signal)]
         attribute = "velocity" if signal == "velocity" else "range"
         values = [getattr(target, attribute) for target in targets]
-        reduce: Callable[[list[float]], float] = {
-            "mean": statistics.fmean, "median": statistics.median_low,
-            "min": min, "max": max}[str(kind)]
-        wanted = reduce(values)
+        wanted = _SINGLE_VALUE[str(kind)](values)
         nearest = min(targets, key=lambda target: abs(getattr(target, attribute) - wanted))
         return [nearest._replace(**{attribute: wanted})]
 

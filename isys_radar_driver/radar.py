@@ -1,0 +1,190 @@
+"""One radar on a line: how it is to be used, what is known of it, and what was counted."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from dataclasses import dataclass, field
+
+from driver_common.device_thread import Backoff
+from driver_common.errors import DriverError, SettingError
+from driver_common.settings import Setting, Value
+from isys_radar_driver.commands import Version
+from isys_radar_driver.frames import BROADCAST
+from isys_radar_driver.line import OVERHEAD
+from isys_radar_driver.models import FAST, Model
+from isys_radar_driver.targets import Resolution
+
+RATE_WINDOW = 5.0  # s over which the rate is measured
+
+
+@dataclass(frozen=True)
+class Identity:
+    """Who a radar says it is (sections 3.3.2 and 3.3.6)."""
+
+    model: Model
+    device_name: str
+    firmware: Version
+    dsp_hardware: Version | None
+    rfe_hardware: Version | None
+    bootloader: Version | None
+
+    @property
+    def serial_number(self) -> str:
+        """What follows the model in the device name (errata I23)."""
+        return self.device_name.removeprefix(self.model.name).strip(" ,:#") or "unknown"
+
+    def __str__(self) -> str:
+        """Return model, serial number and firmware."""
+        return f"{self.model.name} {self.serial_number}, firmware {self.firmware}"
+
+
+@dataclass
+class Statistics:
+    """What was counted for one radar since the start."""
+
+    target_lists: int = 0
+    lost_cycles: int = 0
+    clippings: int = 0
+    timeouts: int = 0
+    refusals: int = 0
+    connections: int = 0
+
+
+@dataclass
+class Options:
+    """How one radar is to be used.
+
+    Attributes:
+        name: Name on a line with several, "" for a single one.
+        address: Its address; 0 = ask by broadcast.
+        model: The only model that is accepted; None = any.
+        output: Output filter of the target lists, 1 to 3.
+        resolution: 16 or 32 bit; 0 = what fits the line.
+        wanted: Settings that the radar is to have.
+        config_mode: "push" writes them, "check" compares, "leave" ignores them.
+        read_digital_outputs: Read the digital outputs after every target list.
+        read_range_list: Read the range list after every target list.
+    """
+
+    name: str = ""
+    address: int = BROADCAST
+    model: Model | None = None
+    output: int = 1
+    resolution: int = 0
+    wanted: dict[str, Value] = field(default_factory=dict)
+    config_mode: str = "push"
+    read_digital_outputs: bool = False
+    read_range_list: bool = False
+
+
+class Radar:
+    """One radar on the line: what is known of it, and what was counted.
+
+    Attributes:
+        options: How it is to be used.
+        address: Its address, 0 while unknown.
+        identity: Who it is; None while it is not connected.
+        settings: The settings that it has, by name.
+        values: The values that it reported, by name.
+        temperatures: Board temperatures in °C, by name.
+        differing: Settings which are not as wanted: name to (wanted, reported).
+        error: Why it is not connected.
+        enabled: Whether acquisition is wanted, as far as the user of the services says.
+        measuring: Whether acquisition was started.
+    """
+
+    def __init__(self, options: Options) -> None:
+        """Begin as an unknown radar."""
+        self.options = options
+        self.address = options.address
+        self.identity: Identity | None = None
+        self.settings: dict[str, Setting] = {}
+        self.values: dict[str, Value] = {}
+        self.temperatures: dict[str, float] = {}
+        self.differing: dict[str, tuple[Value, Value]] = {}
+        self.unsaved: set[str] = set()
+        self.error: DriverError | None = None
+        self.enabled = True
+        self.measuring = False
+        self.statistics = Statistics()
+        self.arrivals: deque[float] = deque()
+        self.backoff = Backoff()
+        self.due = 0.0  # monotonic time of the next step
+        self.misses = 0
+        self.fixed_targets = 0  # learned length of fixed-length lists
+
+    @property
+    def name(self) -> str:
+        """Name of the radar in messages."""
+        return self.options.name or (f"address {self.address}" if self.address else "radar")
+
+    @property
+    def model(self) -> Model | None:
+        """The connected model."""
+        return self.identity.model if self.identity else None
+
+    @property
+    def product(self) -> str:
+        """Name of what is connected."""
+        return self.model.name if self.model else "radar"
+
+    @property
+    def cycle_time(self) -> float:
+        """Cycle time in s in the present measurement mode."""
+        if self.model is None:
+            return 0.0
+        return self.model.cycle_time(self._mode)
+
+    @property
+    def _mode(self) -> int:
+        setting = self.settings.get("measurement_mode")
+        value = self.values.get("measurement_mode")
+        if setting is None or setting.choices is None:
+            return FAST
+        return setting.choices.get(str(value), FAST)
+
+    @property
+    def max_targets(self) -> int:
+        """Most targets in a list in the present measurement mode."""
+        if self.model is None:
+            return 0
+        return self.model.max_targets.get(self._mode, max(self.model.max_targets.values()))
+
+    @property
+    def rate(self) -> float:
+        """Measured target lists per second."""
+        arrivals = self.arrivals
+        if len(arrivals) < 2 or time.monotonic() - arrivals[-1] > RATE_WINDOW:
+            return 0.0
+        return (len(arrivals) - 1) / (arrivals[-1] - arrivals[0])
+
+    def resolution(self, baud_rate: int) -> Resolution:
+        """Return the resolution to ask for; "auto" takes the finest that fits the cycle (I24).
+
+        Raises:
+            SettingError: The model does not have the resolution that was asked for.
+        """
+        assert self.model is not None
+        bits = self.options.resolution
+        possible = [resolution for resolution in self.model.resolutions
+                    if not bits or resolution.bits == bits]
+        if not possible:
+            raise SettingError(f"{self.model.name} has no target lists of {bits} bit; set "
+                               "target_list_resolution to auto")
+        for resolution in possible:
+            size = OVERHEAD + self.max_targets * (14 if resolution.bits == 32 else 7)
+            if size * 10 / baud_rate < self.cycle_time:
+                return resolution
+        return possible[-1]
+
+    def count_list(self, now: float, *, clipping: bool) -> None:
+        """Count a target list, and the cycles that passed without one."""
+        self.statistics.target_lists += 1
+        self.statistics.clippings += clipping
+        if self.arrivals:
+            cycles = round((now - self.arrivals[-1]) / self.cycle_time)
+            self.statistics.lost_cycles += max(0, cycles - 1)
+        self.arrivals.append(now)
+        while now - self.arrivals[0] > RATE_WINDOW:
+            self.arrivals.popleft()
