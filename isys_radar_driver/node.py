@@ -13,7 +13,7 @@ from std_msgs.msg import Float32MultiArray
 
 from driver_common import diagnostics
 from driver_common.device_node import DeviceNode, run
-from driver_common.errors import DriverError
+from driver_common.errors import DriverError, SettingError
 from driver_common.settings import Option
 from driver_common.simulated_line import SimulatedLine
 from isys_radar_driver import commands
@@ -274,6 +274,8 @@ class IsysRadarNode(DeviceNode, Listener):
     def _change_address(self, radar: Radar) -> str:
         sensor = radar.options.name
         address = self.option("new_address", sensor)
+        if not address:
+            raise SettingError(f"set the parameter {self.prefix(sensor)}new_address first")
         old = radar.address
         self.call(lambda: self.bus.change_address(radar, address))
         prefix = self.prefix(sensor)

@@ -149,6 +149,9 @@ class RadarBus:
     def set_enabled(self, radar: Radar, enabled: bool) -> None:
         """Start or stop the acquisition of one radar; raises DriverError."""
         self._require(radar)
+        if enabled and not self._active:
+            raise SettingError("the node is not active, so nothing would be published; "
+                               "activate it first")
         radar.enabled = enabled
         self._start_or_stop(radar)
 
@@ -515,8 +518,8 @@ class RadarBus:
         finally:
             link.baud_rate = configured
         if parser.damaged_frames + parser.dropped_bytes > damaged:
-            return ("; bytes arrive that are no iSYS frames: check the wiring, and that nothing "
-                    "else talks on this line")
+            return ("; bytes arrive that are no iSYS frames: several sensors answer at once (give "
+                    "the parameter address), or something else talks on this line")
         return "; check power, wiring (RS-485: A and B swapped?) and the address"
 
     def _identify(self, radar: Radar) -> Identity:
