@@ -1,0 +1,96 @@
+"""When a sample was taken, on the host's clock, from its place in the stream.
+
+A sensor samples at a steady pace; its frames arrive late, by a changing amount, but never early.
+So the earliest arrivals show the sensor's clock, and the line through them gives each sample its
+time. The line is fitted again once per window, which follows the drift between both clocks.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+WINDOW = 1.0  # s of samples that give one earliest arrival
+WINDOWS = 30  # earliest arrivals that the line goes through
+MAX_DEVIATION = 0.02  # of the nominal rate; beyond it an estimate is no clock
+RESTART = 0.5  # s of disagreement that mean another stream or a set clock
+
+
+class SampleClock:
+    """Maps sample numbers to host times in ns: `base + origin + number * period`.
+
+    Attributes:
+        base: Host time in ns near the beginning, so that `origin` keeps its precision.
+        origin: Time of sample 0 in ns after `base`.
+        period: Time between two samples in ns.
+    """
+
+    def __init__(self, rate: float) -> None:
+        """Start with the nominal rate in Hz; the first update sets the time."""
+        self.nominal_period = 1e9 / rate
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything but the nominal rate."""
+        self.period = self.nominal_period
+        self.base = 0
+        self.origin = 0.0
+        self._earliest: deque[tuple[int, int]] = deque(maxlen=WINDOWS)
+        self._window_size = max(1, round(WINDOW * 1e9 / self.nominal_period))
+        self._window_end = -1
+        self._least_delay = 0.0
+        self._least_point = (0, 0)
+
+    def update(self, number: int, arrival: int) -> None:
+        """Take the arrival of a frame.
+
+        Args:
+            number: Number of the frame's last sample.
+            arrival: Host time in ns when the frame was there.
+        """
+        arrival -= self.base
+        delay = arrival - (self.origin + number * self.period)
+        if self._window_end < 0 or not -RESTART * 1e9 < delay < RESTART * 1e9:
+            self._start(number, arrival + self.base)
+            return
+        if number >= self._window_end:
+            self._end_window(number)
+            delay = arrival - (self.origin + number * self.period)
+            self._least_delay, self._least_point = delay, (number, arrival)
+        elif delay < self._least_delay:
+            self._least_delay, self._least_point = delay, (number, arrival)
+        if delay < 0:  # nothing arrives before it was measured: the line lies too late
+            self.origin += delay
+            self._least_delay = 0.0
+
+    def time_of(self, number: int) -> int:
+        """Return the host time in ns at which a sample was taken."""
+        return self.base + int(self.origin + number * self.period)
+
+    @property
+    def deviation(self) -> float:
+        """How much slower the sensor's clock runs than its nominal rate, as a fraction."""
+        return self.period / self.nominal_period - 1.0
+
+    def _start(self, number: int, arrival: int) -> None:
+        self.reset()
+        self.base = arrival
+        self.origin = -number * self.period
+        self._window_end = number + self._window_size
+        self._least_point = (number, 0)
+
+    def _end_window(self, number: int) -> None:
+        """Fit the line to the earliest arrivals, and begin the next window."""
+        self._earliest.append(self._least_point)
+        self._window_end = number + self._window_size
+        points = self._earliest
+        if len(points) > 1:
+            count = len(points)
+            mean_number = sum(point[0] for point in points) / count
+            mean_arrival = sum(point[1] - points[0][1] for point in points) / count
+            spread = sum((point[0] - mean_number) ** 2 for point in points)
+            slope = sum((point[0] - mean_number) * (point[1] - points[0][1] - mean_arrival)
+                        for point in points) / spread
+            limit = MAX_DEVIATION * self.nominal_period
+            self.period = min(max(slope, self.nominal_period - limit),
+                              self.nominal_period + limit)
+        self.origin = min(arrival - point * self.period for point, arrival in points)

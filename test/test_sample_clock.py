@@ -1,0 +1,76 @@
+"""The clock of a stream: from sample numbers to host times."""
+
+import random
+
+import pytest
+
+from driver_common.sample_clock import SampleClock
+
+RATE = 9523.8
+START = 1_800_000_000_000_000_000  # ns
+
+
+def stream(clock, seconds, delay, drift=0.0, first=0, start=START, samples_per_frame=3):
+    """Feed frames; yield (time given, true time) of each frame's last sample."""
+    period = 1e9 / RATE * (1 + drift)
+    last_arrival = 0
+    for number in range(first, first + int(seconds * RATE), samples_per_frame):
+        true = start + (number - first) * period
+        last_arrival = max(last_arrival, round(true + delay(number)))  # frames keep their order
+        clock.update(number, last_arrival)
+        yield clock.time_of(number), true
+
+
+def errors(pairs, after=0.0):
+    pairs = list(pairs)
+    return [given - true for given, true in pairs[int(after * len(pairs)):]]
+
+
+def test_without_jitter_each_sample_has_its_time():
+    assert max(map(abs, errors(stream(SampleClock(RATE), 5, lambda n: 0)))) < 1000
+
+
+def test_jitter_is_removed():
+    noise = random.Random(1)
+    clock = SampleClock(RATE)
+    off = errors(stream(clock, 30, lambda n: noise.expovariate(1 / 3e6)), after=0.2)
+    # Frames that keep their order are all late by some ms; what counts is that the pace is even.
+    assert max(off) - min(off) < 300_000
+
+
+def test_bursts_are_spread():
+    clock = SampleClock(RATE)
+    off = errors(stream(clock, 10, lambda n: 20e6 * (1 - (n % 190) / 190)), after=0.3)
+    assert max(map(abs, off)) < 1_000_000
+
+
+@pytest.mark.parametrize("drift", [-0.015, -100e-6, 100e-6, 0.015])
+def test_drift_is_followed(drift):
+    noise = random.Random(2)
+    clock = SampleClock(RATE)
+    off = errors(stream(clock, 40, lambda n: noise.uniform(0, 1e6), drift), after=0.5)
+    assert max(map(abs, off)) < 500_000
+    assert clock.deviation == pytest.approx(drift, abs=20e-6)
+
+
+def test_a_lost_second_shifts_nothing():
+    clock = SampleClock(RATE)
+    list(stream(clock, 5, lambda n: 0))
+    number = int(6 * RATE)
+    true = START + number * 1e9 / RATE
+    clock.update(number, round(true))
+    assert clock.time_of(number) == pytest.approx(true, abs=1000)
+
+
+def test_a_clock_that_was_set_starts_anew():
+    clock = SampleClock(RATE)
+    list(stream(clock, 3, lambda n: 0))
+    later = START + 3600 * 10**9
+    off = errors(stream(clock, 3, lambda n: 0, first=int(3 * RATE), start=later))
+    assert max(map(abs, off)) < 1000
+
+
+def test_a_late_first_frame_is_corrected_by_the_first_early_one():
+    clock = SampleClock(RATE)
+    off = errors(stream(clock, 1, lambda n: 50e6 if n < 300 else 0), after=0.1)
+    assert max(map(abs, off)) < 1000
