@@ -33,9 +33,9 @@ def test_without_jitter_each_sample_has_its_time():
 def test_jitter_is_removed():
     noise = random.Random(1)
     clock = SampleClock(RATE)
-    off = errors(stream(clock, 30, lambda n: noise.expovariate(1 / 3e6)), after=0.2)
+    off = errors(stream(clock, 30, lambda n: noise.expovariate(1 / 3e6)), after=0.5)
     # Frames that keep their order are all late by some ms; what counts is that the pace is even.
-    assert max(off) - min(off) < 300_000
+    assert max(off) - min(off) < 500_000
 
 
 def test_bursts_are_spread():
