@@ -11,6 +11,7 @@ from collections import deque
 
 WINDOW = 1.0  # s of samples that give one earliest arrival
 WINDOWS = 30  # earliest arrivals that the line goes through
+SETTLED = 3  # of them make it trustworthy
 MAX_DEVIATION = 0.02  # of the nominal rate; beyond it an estimate is no clock
 RESTART = 0.5  # s of disagreement that mean another stream or a set clock
 
@@ -58,8 +59,8 @@ class SampleClock:
             self._least_delay, self._least_point = delay, (number, arrival)
         elif delay < self._least_delay:
             self._least_delay, self._least_point = delay, (number, arrival)
-        if delay < 0:  # nothing arrives before it was measured: the line lies too late
-            self.origin += delay
+        if delay < 0 and len(self._earliest) < SETTLED:
+            self.origin += delay  # nothing arrives before it was measured: the line lay too late
             self._least_delay = 0.0
 
     def time_of(self, number: int) -> int:
@@ -83,14 +84,13 @@ class SampleClock:
         self._earliest.append(self._least_point)
         self._window_end = number + self._window_size
         points = self._earliest
-        if len(points) > 1:
-            count = len(points)
-            mean_number = sum(point[0] for point in points) / count
-            mean_arrival = sum(point[1] - points[0][1] for point in points) / count
-            spread = sum((point[0] - mean_number) ** 2 for point in points)
-            slope = sum((point[0] - mean_number) * (point[1] - points[0][1] - mean_arrival)
-                        for point in points) / spread
-            limit = MAX_DEVIATION * self.nominal_period
-            self.period = min(max(slope, self.nominal_period - limit),
-                              self.nominal_period + limit)
-        self.origin = min(arrival - point * self.period for point, arrival in points)
+        if len(points) < 2:
+            return
+        mean_number = sum(number for number, _ in points) / len(points)
+        mean_arrival = sum(arrival for _, arrival in points) / len(points)
+        spread = sum((number - mean_number) ** 2 for number, _ in points)
+        slope = sum((number - mean_number) * (arrival - mean_arrival)
+                    for number, arrival in points) / spread
+        limit = MAX_DEVIATION * self.nominal_period
+        self.period = min(max(slope, self.nominal_period - limit), self.nominal_period + limit)
+        self.origin = mean_arrival - mean_number * self.period
