@@ -8,7 +8,7 @@ import traceback
 from collections.abc import Callable
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from driver_common.errors import DriverError, NoAnswerError
 
@@ -53,6 +53,14 @@ class Bus(Protocol):
 
     def close(self) -> None:
         """Leave the devices stopped and close the link, in whatever state they are."""
+
+
+@runtime_checkable
+class Interruptible(Protocol):
+    """A bus whose steps can take long."""
+
+    def interrupt(self) -> None:
+        """Have the present step end soon with a DriverError; called from another thread."""
 
 
 class DeviceThread(threading.Thread):
@@ -100,6 +108,8 @@ class DeviceThread(threading.Thread):
         """Close the bus, end the thread and wait for it."""
         self._stopping = True
         self._jobs.put(None)
+        if isinstance(self._bus, Interruptible):
+            self._bus.interrupt()
         if self.is_alive():
             self.join()
 

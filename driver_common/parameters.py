@@ -37,6 +37,9 @@ def to_descriptor(row: Parameter, value: Value) -> ParameterDescriptor:
     descriptor = ParameterDescriptor(description="; ".join(details), read_only=row.read_only)
     if row.choices is not None:
         descriptor.additional_constraints = "one of " + ", ".join(row.choices)
+    elif isinstance(row, Setting) and row.values:
+        descriptor.additional_constraints = "one of " + ", ".join(f"{step:g}"
+                                                                  for step in row.values)
     elif isinstance(row, Setting) and row.kind is float and row.factor != 1:
         descriptor.additional_constraints = f"rounded to steps of {row.factor:g} {row.unit}"
     low, high = row.limits

@@ -7,6 +7,7 @@ Reading and writing settings through any device is done here, once for all drive
 
 from __future__ import annotations
 
+import bisect
 import contextlib
 import difflib
 import ipaddress
@@ -21,6 +22,8 @@ from driver_common.errors import DriverError, RefusedError, SettingError
 
 Value: TypeAlias = bool | int | float | str | list[str]
 Raw: TypeAlias = int | float | bytes
+
+UNKNOWN = -1  # value of a code that is not in a setting's table
 
 
 @dataclass(frozen=True)
@@ -63,6 +66,8 @@ class Parameter:
             value = float(value)
         if self.kind is int and isinstance(value, float) and value.is_integer():
             value = int(value)
+        if self.choices is not None and _as_word(value) in self.choices:
+            value = _as_word(value)
         if self.kind is list and isinstance(value, Sequence) and not isinstance(value, str):
             if all(isinstance(item, str) for item in value):
                 return list(value)
@@ -158,13 +163,15 @@ class Record:
 class Setting(Parameter):
     """One setting of a device: the row from which everything else follows.
 
-    The value in the parameter's unit is `raw * factor + offset`.
+    The value in the parameter's unit is `raw * factor + offset`, or `values[raw]`.
 
     Attributes:
         record: Where the value lives in the device.
         field: Index of the value in the record.
         factor: Size of one raw step in `unit`.
         offset: Value of raw zero in `unit`.
+        values: The only allowed values, rising, in the order of their codes 0, 1, …; empty where
+            factor and offset say what a code means.
         needs_stop: Whether the device accepts a write only while it does not measure.
         section: Section of the device's manual.
     """
@@ -174,6 +181,7 @@ class Setting(Parameter):
     field: int = 0
     factor: float = 1
     offset: float = 0
+    values: tuple[float, ...] = ()
     needs_stop: bool = False
     section: str = ""
 
@@ -182,7 +190,8 @@ class Setting(Parameter):
         if self.choices is not None or self.wire.endswith("s"):
             object.__setattr__(self, "kind", str)
         elif (self.kind is float and self.wire not in "fd"
-              and isinstance(self.factor, int) and isinstance(self.offset, int)):
+              and all(isinstance(number, int)
+                      for number in self.values or (self.factor, self.offset))):
             object.__setattr__(self, "kind", int)
 
     @property
@@ -193,6 +202,8 @@ class Setting(Parameter):
     @property
     def limits(self) -> tuple[float | None, float | None]:
         """Smallest and largest allowed value: the manual's, else those of the wire type."""
+        if self.values:
+            return self.values[0], self.values[-1]
         if self.kind not in (int, float) or self.wire in "fd":
             return self.minimum, self.maximum
         bits = 8 * struct.calcsize("=" + self.wire)
@@ -216,7 +227,7 @@ class Setting(Parameter):
         """Return the raw value, rounded to the device's resolution.
 
         Raises:
-            SettingError: Wrong type, unknown choice or out of range.
+            SettingError: Wrong type, unknown choice, out of range, or between two of `values`.
         """
         checked = super().check(value)
         if self.choices is not None:
@@ -228,6 +239,8 @@ class Setting(Parameter):
                 raise SettingError(f"{self.name} must be an IPv4 address such as 192.168.60.20, "
                                    f"not {checked!r}") from None
         assert isinstance(checked, (bool, int, float))
+        if self.values:
+            return self._code(checked)
         raw = (checked - self.offset) / self.factor
         if self.wire not in "fd":
             return round(raw)
@@ -237,21 +250,41 @@ class Setting(Parameter):
             raise SettingError(f"{self.name} = {self.text(checked)} is out of range, it must fit "
                                f"a 32-bit floating-point number") from None
 
+    def _code(self, value: float) -> int:
+        code = bisect.bisect_left(self.values, value)
+        if self.values[code] != value:
+            below, above = (self.text(self.values[index]) for index in (code - 1, code))
+            raise SettingError(f"{self.name} = {self.text(value)} lies between two steps, "
+                               f"the nearest are {below} and {above}")
+        return code
+
     def decode(self, raw: Raw) -> Value:
         """Return the value of a raw one, in the parameter's unit.
 
         A code without a name in `choices` comes back as "code_N": what the device says is shown.
+        One that is not in `values` comes back as UNKNOWN.
         """
         if isinstance(raw, bytes):
             return str(ipaddress.IPv4Address(raw))
         if self.choices is not None:
             return next((word for word, code in self.choices.items() if code == raw),
                         f"code_{raw}")
+        if self.values:
+            known = isinstance(raw, int) and 0 <= raw < len(self.values)
+            value: Value = self.kind(self.values[int(raw)] if known else UNKNOWN)
+            return value
         if self.wire == "f":
             return _shortest_float32(raw * self.factor + self.offset)
         if self.kind is float:
             return round(raw * self.factor + self.offset, 9)
         return self.kind(raw * self.factor + self.offset)  # type: ignore[no-any-return]
+
+
+def _as_word(value: object) -> str:
+    """Return the word that YAML took for another type: on, off, 16, inf, nan."""
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    return str(value)
 
 
 def _shortest_float32(value: float) -> float:

@@ -103,7 +103,7 @@ class SimulatedLine:
         self.port = self._transport.port
         self._due: list[tuple[float, int, bytes]] = []
         self._order = itertools.count()
-        self._line_free = 0.0
+        self._busy: list[tuple[float, float]] = []  # when the line is taken, from … until
         self._wake_reader, self._wake_writer = os.pipe()
         self._thread = threading.Thread(target=self._run, name="simulated line", daemon=True)
 
@@ -151,13 +151,22 @@ class SimulatedLine:
 
     def _schedule(self, due: float, data: bytes) -> None:
         """Plan bytes in chunks, each at the time at which its last byte has been sent."""
-        due = max(due, self._line_free)
+        due = self._first_free(due, len(data) * self._byte_time)
         size = max(1, round(CHUNK_TIME / self._byte_time))
         for start in range(0, len(data), size):
             chunk = data[start:start + size]
             due += len(chunk) * self._byte_time
             heapq.heappush(self._due, (due, next(self._order), chunk))
-        self._line_free = due
+
+    def _first_free(self, due: float, duration: float) -> float:
+        """Return when the line is free for so long, at `due` or later, and take it."""
+        now = time.monotonic()
+        self._busy = [(start, end) for start, end in self._busy if end > now]
+        for start, end in self._busy:
+            if due < end and start < due + duration:
+                due = end
+        self._busy = sorted([*self._busy, (due, due + duration)])
+        return due
 
     def _send(self, now: float) -> None:
         while self._due and self._due[0][0] <= now:

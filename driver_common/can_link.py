@@ -1,0 +1,137 @@
+"""A CAN bus through python-can, opened well: errors in words, frames in and out."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import logging
+import os
+import socket
+from collections.abc import Sequence
+
+import can
+
+from driver_common.errors import LinkError, SettingError
+from driver_common.settings import suggestion
+
+CONNECT_TIMEOUT = 2.0  # s
+SEND_TIMEOUT = 0.5  # s
+RECEIVE_BUFFER = 4 * 1024 * 1024  # bytes; some seconds of the fastest stream
+_ADVICE = {
+    errno.ENODEV: "there is no such channel; 'ip -brief link show type can' lists them",
+    errno.ENETDOWN: "it is down; 'sudo ip link set {channel} up type can bitrate {bitrate}' "
+                    "brings it up",
+    errno.EAFNOSUPPORT: "this kernel has no CAN; 'sudo modprobe can_raw' loads it",
+    errno.EPERM: "no permission; bring the channel up as root, then a user may open it",
+    errno.ECONNREFUSED: "nothing listens there; check host and port in can_options",
+    errno.ENOBUFS: "the transmit buffer is full: nobody acknowledges; check wiring, termination "
+                   "and bit rate",
+}
+
+
+class CanLink:
+    """A CAN bus.
+
+    Args:
+        interface: Interface of python-can, such as "socketcan" or "socketcand".
+        channel: Channel of the interface, such as "can0".
+        bitrate: In bit/s; some interfaces are set up outside and ignore it.
+        options: Further options of the interface, each "name=value".
+        filters: Identifier and mask of the extended frames that are wanted; given to the kernel
+            where it can filter. Frames that pass must still be looked at.
+
+    Raises:
+        LinkError: From every method, with what is wrong and what to do.
+        SettingError: An option has no "=".
+    """
+
+    def __init__(self, interface: str, channel: str, bitrate: int, options: Sequence[str],
+                 filters: Sequence[tuple[int, int]]) -> None:
+        """Open the bus; returns or raises within a few seconds."""
+        logging.getLogger("can").setLevel(logging.CRITICAL)  # its warnings come per frame
+        self.interface, self.channel, self._bitrate = interface, channel, bitrate
+        more = parse_options(options)
+        if interface == "socketcand":
+            self._try_server(more)
+        elif interface == "socketcan":  # others filter in Python, which costs more than it saves
+            more["can_filters"] = [{"can_id": number, "can_mask": mask, "extended": True}
+                                   for number, mask in filters]
+        try:
+            self._bus = can.Bus(interface=interface, channel=channel, bitrate=bitrate,
+                                ignore_config=True, **more)  # type: ignore[arg-type]
+        except (can.CanError, OSError, ImportError, NotImplementedError, ValueError, TypeError,
+                AssertionError) as error:
+            raise LinkError(f"cannot open {self}: {self._reason(error)}") from error
+        self.receive = self._bus.recv
+        self._enlarge_receive_buffer()
+
+    def __str__(self) -> str:
+        """Return interface and channel."""
+        return f"{self.interface} {self.channel}"
+
+    def send(self, identifier: int, data: bytes) -> None:
+        """Send an extended frame."""
+        try:
+            self._bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=True),
+                           timeout=SEND_TIMEOUT)
+        except (can.CanError, OSError) as error:
+            raise self.lost(error) from error
+
+    def lost(self, error: Exception) -> LinkError:
+        """Return the error in words, for one that `receive` raised."""
+        return LinkError(f"lost {self}: {self._reason(error)}")
+
+    def close(self) -> None:
+        """Close the bus; it may be gone already."""
+        with contextlib.suppress(can.CanError, OSError):
+            self._bus.shutdown()
+
+    def _try_server(self, options: dict[str, object]) -> None:
+        """Connect once: python-can itself tries for ten seconds, without a pause."""
+        host, port = options.get("host"), options.get("port")
+        if not isinstance(host, str) or not isinstance(port, int):
+            raise LinkError('socketcand needs can_options such as ["host=127.0.0.1", '
+                            '"port=29536"]')
+        try:
+            socket.create_connection((host, port), CONNECT_TIMEOUT).close()
+        except OSError as error:
+            raise LinkError(f"cannot open {self} at {host}:{port}: "
+                            f"{self._reason(error)}") from error
+
+    def _enlarge_receive_buffer(self) -> None:
+        """Let the kernel keep what arrives while this process waits for the processor."""
+        with contextlib.suppress(OSError, NotImplementedError, ValueError):
+            duplicate = socket.socket(fileno=os.dup(self._bus.fileno()))
+            duplicate.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
+            duplicate.close()
+
+    def _reason(self, error: BaseException) -> str:
+        cause: BaseException | None = error
+        while cause is not None:
+            number = getattr(cause, "errno", None) or getattr(cause, "error_code", None)
+            if number in _ADVICE:
+                return _ADVICE[number].format(channel=self.channel, bitrate=self._bitrate)
+            cause = cause.__cause__ or cause.__context__
+        if self.interface not in can.VALID_INTERFACES:
+            known = sorted(can.VALID_INTERFACES)
+            return (f"python-can has no such interface{suggestion(self.interface, known)} "
+                    f"(it has {', '.join(known)})")
+        if isinstance(error, TimeoutError):
+            return "no answer; check host and port in can_options"
+        return str(error) or type(error).__name__
+
+
+def parse_options(options: Sequence[str]) -> dict[str, object]:
+    """Return the options as python-can takes them: numbers and true or false in their own type.
+
+    Raises:
+        SettingError: An option is not "name=value".
+    """
+    parsed: dict[str, object] = {}
+    for option in options:
+        name, separator, text = option.partition("=")
+        if not separator or not name:
+            raise SettingError(f'can_options must be like "host=127.0.0.1", not {option!r}')
+        words: dict[str, object] = {"true": True, "false": False}
+        parsed[name] = int(text) if text.lstrip("-").isdigit() else words.get(text.lower(), text)
+    return parsed

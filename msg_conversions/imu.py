@@ -1,0 +1,59 @@
+"""Accelerations as sensor_msgs/Imu, serialised at thousands of messages a second.
+
+Building and serialising a message object costs several times what publishing its bytes does. A
+stream changes stamp and acceleration only, so one serialised message is made and these are patched.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import Imu
+
+from msg_conversions.header import to_header
+
+NOT_MEASURED = -1.0  # first element of a covariance (sensor_msgs/Imu)
+UNKNOWN_VARIANCE = 1e6  # m²/s⁴, of an axis that is not measured
+NANOSECONDS = 1_000_000_000
+
+_STAMP_OFFSET = 4  # behind the header of the encapsulation
+_COVARIANCE_SIZE = 9 * 8
+_put_stamp = struct.Struct("<iI").pack_into
+_put_acceleration = struct.Struct("<ddd").pack_into
+
+
+def to_imu(acceleration: Sequence[float], variances: Sequence[float], frame_id: str,
+           stamp: int) -> Imu:
+    """Return an Imu that holds an acceleration and nothing else (REP-145: data_raw).
+
+    Args:
+        acceleration: x, y, z in m/s².
+        variances: Of x, y, z in m²/s⁴; zeros = unknown.
+        frame_id: Frame of the sensor.
+        stamp: Time of measurement in ns since the epoch.
+    """
+    imu = Imu(header=to_header(frame_id, stamp))
+    imu.orientation_covariance[0] = NOT_MEASURED
+    imu.angular_velocity_covariance[0] = NOT_MEASURED
+    for axis, name in enumerate("xyz"):
+        setattr(imu.linear_acceleration, name, float(acceleration[axis]))
+        imu.linear_acceleration_covariance[4 * axis] = variances[axis]
+    return imu
+
+
+class ImuTemplate:
+    """A serialised Imu of which stamp and acceleration can be replaced."""
+
+    def __init__(self, variances: Sequence[float], frame_id: str) -> None:
+        """Serialise the message once; see `to_imu` for the arguments."""
+        self._buffer = bytearray(serialize_message(to_imu((0.0, 0.0, 0.0), variances, frame_id, 0)))
+        self._offset = len(self._buffer) - _COVARIANCE_SIZE - 3 * 8
+
+    def serialised(self, stamp: int, x: float, y: float, z: float) -> bytes:
+        """Return the serialised message with this stamp in ns and this acceleration in m/s²."""
+        seconds = stamp // NANOSECONDS
+        _put_stamp(self._buffer, _STAMP_OFFSET, seconds, stamp - seconds * NANOSECONDS)
+        _put_acceleration(self._buffer, self._offset, x, y, z)
+        return bytes(self._buffer)
