@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
@@ -22,11 +23,13 @@ from driver_common.errors import DriverError, SettingError
 from driver_common.parameters import ParameterStore, refusal
 from driver_common.settings import Option, Setting, Value
 
+SENSOR_NAME = re.compile("[a-z][a-z0-9_]*")
 CONFIG_MODES = {"push": 0, "check": 1, "leave": 2}
 
+SENSORS = Option(
+    "sensors", kind=list, default=[],
+    description="Names of the sensors on the bus; empty = a single one without a name")
 COMMON_OPTIONS = (
-    Option("sensors", kind=list, default=[],
-           description="Names of the sensors on the bus; empty = a single one without a name"),
     Option("autostart", kind=bool, default=True,
            description="Configure and activate without being asked"),
     Option("config_mode", kind=str, choices=CONFIG_MODES, default="push",
@@ -45,6 +48,7 @@ class DeviceNode(LifecycleNode):
         thread: The thread that serves it.
     """
 
+    SEVERAL_SENSORS = True  # whether the bus can have more than one
     BUS_OPTIONS: Sequence[Option] = ()
     SENSOR_OPTIONS: Sequence[Option] = ()
     ALL_SETTINGS: Mapping[str, Setting] = {}
@@ -92,12 +96,27 @@ class DeviceNode(LifecycleNode):
     # --- parameters ---
 
     def _declare_options(self) -> None:
-        for option in (*COMMON_OPTIONS, *self.BUS_OPTIONS):
+        for option in self.bus_options():
             self._declare_option("", option)
+        self._check_sensor_names()
         for sensor in self.sensors:
             for option in self.SENSOR_OPTIONS:
                 self._declare_option(self.prefix(sensor), option)
         self._warn_of_unknown_overrides()
+
+    @classmethod
+    def bus_options(cls) -> list[Option]:
+        """Return the options that do not belong to one sensor."""
+        return [*([SENSORS] if cls.SEVERAL_SENSORS else []), *COMMON_OPTIONS, *cls.BUS_OPTIONS]
+
+    def _check_sensor_names(self) -> None:
+        reserved = {option.name for option in self.bus_options()}
+        for sensor in self.sensors:
+            if sensor and (not SENSOR_NAME.fullmatch(sensor) or sensor in reserved):
+                raise SettingError(f'sensors: "{sensor}" cannot be a name, it must be a lower-case '
+                                   "word such as front, and no parameter of the node")
+        if len(set(self.sensors)) < len(self.sensors):
+            raise SettingError("sensors: each name must be there once")
 
     def _declare_option(self, prefix: str, option: Option) -> None:
         name = prefix + option.name
@@ -112,7 +131,7 @@ class DeviceNode(LifecycleNode):
 
     def _warn_of_unknown_overrides(self) -> None:
         """Name overrides that no model of this driver could have."""
-        known = [option.name for option in (*COMMON_OPTIONS, *self.BUS_OPTIONS)]
+        known = [option.name for option in self.bus_options()]
         for sensor in self.sensors:
             known += [self.prefix(sensor) + name for name in (
                 *(option.name for option in self.SENSOR_OPTIONS), *self.ALL_SETTINGS)]
@@ -122,7 +141,7 @@ class DeviceNode(LifecycleNode):
     @property
     def sensors(self) -> list[str]:
         """Names of the sensors, [""] for a single one without a name."""
-        names: list[str] = self.get_parameter("sensors").value
+        names = self.option("sensors") if self.SEVERAL_SENSORS else []
         return list(names) or [""]
 
     @staticmethod
