@@ -178,10 +178,6 @@ class IsysRadarNode(DeviceNode, Listener):
                 f"{self._title(radar)}: the {radar.model.name} does not hand out target lists "
                 "over its serial port, so there are no points; it can be configured here, and its "
                 "targets come from its other interfaces")
-        for name, (wanted, reported) in radar.differing.items():
-            self.get_logger().warning(
-                f"{self._title(radar)}: {name} is {radar.settings[name].text(reported)}, "
-                f"not {radar.settings[name].text(wanted)}")
         self.show_settings(radar.options.name, radar)
 
     def on_values(self, radar: Radar) -> None:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
-from driver_common.device_thread import Backoff
-from driver_common.errors import DriverError, SettingError
-from driver_common.settings import Setting, Value
+from driver_common.device import Device, DeviceOptions
+from driver_common.errors import SettingError
 from isys_radar_driver.commands import Version
 from isys_radar_driver.frames import BROADCAST
 from isys_radar_driver.line import OVERHEAD
@@ -52,65 +51,49 @@ class Statistics:
 
 
 @dataclass
-class Options:
+class Options(DeviceOptions):
     """How one radar is to be used.
 
     Attributes:
-        name: Name on a line with several, "" for a single one.
         address: Its address; 0 = ask by broadcast.
         model: The only model that is accepted; None = any.
         output: Output filter of the target lists, 1 to 3.
         resolution: 16 or 32 bit; 0 = what fits the line.
-        wanted: Settings that the radar is to have.
-        config_mode: "push" writes them, "check" compares, "leave" ignores them.
         read_digital_outputs: Read the digital outputs after every target list.
         read_range_list: Read the range list after every target list.
     """
 
-    name: str = ""
     address: int = BROADCAST
     model: Model | None = None
     output: int = 1
     resolution: int = 0
-    wanted: dict[str, Value] = field(default_factory=dict)
-    config_mode: str = "push"
     read_digital_outputs: bool = False
     read_range_list: bool = False
 
 
-class Radar:
+class Radar(Device):
     """One radar on the line: what is known of it, and what was counted.
 
     Attributes:
         options: How it is to be used.
         address: Its address, 0 while unknown.
         identity: Who it is; None while it is not connected.
-        settings: The settings that it has, by name.
-        values: The values that it reported, by name.
         temperatures: Board temperatures in °C, by name.
-        differing: Settings which are not as wanted: name to (wanted, reported).
-        error: Why it is not connected.
         enabled: Whether acquisition is wanted, as far as the user of the services says.
         measuring: Whether acquisition was started.
     """
 
     def __init__(self, options: Options) -> None:
         """Begin as an unknown radar."""
+        super().__init__(options)
         self.options = options
         self.address = options.address
         self.identity: Identity | None = None
-        self.settings: dict[str, Setting] = {}
-        self.values: dict[str, Value] = {}
         self.temperatures: dict[str, float] = {}
-        self.differing: dict[str, tuple[Value, Value]] = {}
-        self.unsaved: set[str] = set()
-        self.error: DriverError | None = None
         self.enabled = True
         self.measuring = False
         self.statistics = Statistics()
         self.arrivals: deque[float] = deque()
-        self.backoff = Backoff()
-        self.due = 0.0  # monotonic time of the next step
         self.misses = 0
         self.fixed_targets = 0  # learned length of fixed-length lists
 

@@ -9,8 +9,10 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 from typing import TypeVar
 
+from driver_common.device import Note
 from driver_common.errors import (
     DriverError,
     FrameError,
@@ -20,7 +22,7 @@ from driver_common.errors import (
     SettingError,
     WrongDeviceError,
 )
-from driver_common.settings import Raw, Record, Setting, Value, read_settings, write_settings
+from driver_common.settings import Raw, Record, Setting, Value, read_settings
 from isys_radar_driver import commands
 from isys_radar_driver.commands import Command, IsysRecord, Location, RangeList, RawSignals
 from isys_radar_driver.frames import (
@@ -163,13 +165,7 @@ class RadarBus:
         """
         self._require(radar)
         with self._stopped_for(radar, changes):
-            reported = write_settings(_Access(self, radar), radar.settings, changes)
-        radar.unsaved |= {name for name in changes if reported[name] != radar.values.get(name)}
-        radar.options.wanted |= reported
-        radar.values |= reported
-        for name in changes:
-            radar.differing.pop(name, None)
-        return reported
+            return radar.write(_Access(self, radar), changes)
 
     def execute(self, radar: Radar, command: Command[T]) -> T:
         """Carry out a command that the model has; raises DriverError."""
@@ -221,7 +217,7 @@ class RadarBus:
                 self._execute(radar, commands.READ_DEVICE_NAME)
             except NoAnswerError:  # the address may have been restored as well
                 radar.address = model.address
-            radar.values = self._read_all(radar)
+            self._read_all(radar)
         finally:
             radar.measuring = measuring
             self._start_or_stop(radar)
@@ -343,50 +339,10 @@ class RadarBus:
     def _configure(self, radar: Radar) -> None:
         """Read all settings, make them as wanted, and start if that is wanted."""
         assert radar.identity is not None
-        radar.settings = settings_of(radar.identity.model)
-        radar.values = self._read_all(radar)
+        self._read_all(radar)
         radar.measuring = True  # unknown: it may have been left running
-        radar.differing = {}
-        wanted = self._wanted(radar)
-        if radar.options.config_mode == "push":
-            self._push(radar, wanted)
-        elif radar.options.config_mode == "check":
-            radar.differing |= {name: (value, radar.values[name])
-                                for name, value in wanted.items()}
+        radar.make_as_wanted(lambda changes: self.write(radar, changes), self._note_of(radar))
         self._start_or_stop(radar)
-
-    def _wanted(self, radar: Radar) -> dict[str, Value]:
-        """Return the wanted values, as the radar can hold them, that it does not have yet."""
-        wanted = {}
-        for name, value in radar.options.wanted.items():
-            if name in radar.settings:
-                try:
-                    checked = radar.settings[name].check(value)
-                except SettingError as error:
-                    radar.differing[name] = (value, radar.values[name])
-                    self._listener.on_note(radar, f"{error}; it stays as it is", warning=True)
-                else:
-                    if checked != radar.values[name]:
-                        wanted[name] = checked
-        return wanted
-
-    def _push(self, radar: Radar, wanted: Mapping[str, Value]) -> None:
-        """Write wanted settings together; where that is refused, each that is not refused."""
-        before = dict(radar.values)
-        try:
-            self.write(radar, wanted)
-        except (RefusedError, SettingError):
-            for name, value in wanted.items():
-                try:
-                    self.write(radar, {name: value})
-                except (RefusedError, SettingError) as error:
-                    radar.differing[name] = (value, radar.values[name])
-                    self._listener.on_note(radar, str(error), warning=True)
-        changed = [f"{name}: {radar.settings[name].text(before[name])} → "
-                   f"{radar.settings[name].text(radar.values[name])}"
-                   for name in wanted if radar.values[name] != before[name]]
-        if changed:
-            self._listener.on_note(radar, "wrote " + ", ".join(changed))
 
     def _start_or_stop(self, radar: Radar) -> None:
         wanted = self._active and radar.enabled
@@ -538,21 +494,12 @@ class RadarBus:
         except RefusedError:
             return None
 
-    def _read_all(self, radar: Radar) -> dict[str, Value]:
-        """Read all settings; those that the firmware refuses to tell are not offered."""
-        records: dict[Record, list[Setting]] = {}
-        for setting in radar.settings.values():
-            records.setdefault(setting.record, []).append(setting)
-        values: dict[str, Value] = {}
-        for settings in records.values():
-            try:
-                values |= read_settings(_Access(self, radar), settings)
-            except RefusedError:
-                names = ", ".join(setting.name for setting in settings)
-                self._listener.on_note(radar, f"this firmware has no {names}", warning=True)
-                for setting in settings:
-                    del radar.settings[setting.name]
-        return values
+    def _read_all(self, radar: Radar) -> None:
+        radar.read_all(_Access(self, radar), settings_of(self._require(radar)),
+                       self._note_of(radar))
+
+    def _note_of(self, radar: Radar) -> Note:
+        return partial(self._listener.on_note, radar)
 
     def _execute(self, radar: Radar, command: Command[T], timeout: float = 0.0) -> T:
         return self._timed(radar, command, timeout)[0]

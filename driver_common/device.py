@@ -1,0 +1,144 @@
+"""A device on a bus: the settings it has, the values it reported, and what the user wants."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from driver_common.device_thread import Backoff
+from driver_common.errors import DriverError, RefusedError, SettingError
+from driver_common.settings import (
+    Record,
+    RecordAccess,
+    Setting,
+    Value,
+    read_settings,
+    write_settings,
+)
+
+
+class Note(Protocol):
+    """Takes something that is worth a line in the log."""
+
+    def __call__(self, text: str, *, warning: bool = False) -> None:
+        """Take a line."""
+
+
+@dataclass
+class DeviceOptions:
+    """How a device is to be used.
+
+    Attributes:
+        name: Its name on a bus with several, "" for a single one.
+        wanted: Settings that it is to have.
+        config_mode: "push" writes them, "check" compares, "leave" ignores them.
+    """
+
+    name: str = ""
+    wanted: dict[str, Value] = field(default_factory=dict)
+    config_mode: str = "push"
+
+
+class Device:
+    """What is known of a device; the session of a driver fills it.
+
+    Attributes:
+        settings: The settings that it has, by name.
+        values: The values that it reported, by name.
+        differing: Settings which are not as wanted: name to (wanted, reported).
+        unsaved: Settings that this driver changed and that were not saved since.
+        error: Why it is not connected.
+        backoff: Pauses between attempts to find it.
+        due: Monotonic time in s of its next step.
+    """
+
+    def __init__(self, options: DeviceOptions) -> None:
+        """Begin as an unknown device."""
+        self._options = options
+        self.settings: dict[str, Setting] = {}
+        self.values: dict[str, Value] = {}
+        self.differing: dict[str, tuple[Value, Value]] = {}
+        self.unsaved: set[str] = set()
+        self.error: DriverError | None = None
+        self.backoff = Backoff()
+        self.due = 0.0
+
+    def read_all(self, access: RecordAccess, settings: Mapping[str, Setting], note: Note) -> None:
+        """Read all settings; those that the device refuses to tell are not offered."""
+        records: dict[Record, list[Setting]] = {}
+        for setting in settings.values():
+            records.setdefault(setting.record, []).append(setting)
+        self.settings = dict(settings)
+        self.values = {}
+        for group in records.values():
+            try:
+                self.values |= read_settings(access, group)
+            except RefusedError:
+                names = ", ".join(setting.name for setting in group)
+                note(f"this firmware has no {names}", warning=True)
+                for setting in group:
+                    del self.settings[setting.name]
+
+    def write(self, access: RecordAccess, changes: Mapping[str, Value]) -> dict[str, Value]:
+        """Write settings, all or none, and return what the device reports; see `write_settings`."""
+        reported = write_settings(access, self.settings, changes)
+        self.unsaved |= {name for name in changes if reported[name] != self.values.get(name)}
+        self._options.wanted |= reported
+        self.values |= reported
+        for name in changes:
+            self.differing.pop(name, None)
+        return reported
+
+    def make_as_wanted(self, write: Callable[[Mapping[str, Value]], object], note: Note) -> None:
+        """Compare with what is wanted; where it differs write, warn or do nothing.
+
+        Args:
+            write: Writes settings with what the driver needs around it, and ends in `self.write`.
+            note: Told what was changed or refused.
+        """
+        self.differing = {}
+        wanted = self._missing(note)
+        if self._options.config_mode == "push":
+            self._push(wanted, write, note)
+        elif self._options.config_mode == "check":
+            self.differing |= {name: (value, self.values[name]) for name, value in wanted.items()}
+        for name, (value, reported) in self.differing.items():
+            setting = self.settings[name]
+            note(f"{name} is {setting.text(reported)}, not {setting.text(value)} as wanted",
+                 warning=True)
+
+    def _missing(self, note: Note) -> dict[str, Value]:
+        """Return the wanted values, as the device can hold them, that it does not have yet."""
+        wanted = {}
+        for name, value in self._options.wanted.items():
+            if name in self.settings:
+                try:
+                    checked = self.settings[name].check(value)
+                except SettingError as error:
+                    note(str(error), warning=True)
+                    self.differing[name] = (value, self.values[name])
+                else:
+                    if checked != self.values[name]:
+                        wanted[name] = checked
+        return wanted
+
+    def _push(self, wanted: Mapping[str, Value],
+              write: Callable[[Mapping[str, Value]], object], note: Note) -> None:
+        """Write wanted settings together; where that is refused, each that is not refused."""
+        before = dict(self.values)
+        try:
+            if wanted:
+                write(wanted)
+        except (RefusedError, SettingError):
+            for name, value in wanted.items():
+                try:
+                    write({name: value})
+                except (RefusedError, SettingError) as error:
+                    note(str(error), warning=True)
+                    self.differing[name] = (value, self.values[name])
+        changed = [f"{name}: {self.settings[name].text(before[name])} → "
+                   f"{self.settings[name].text(self.values[name])}"
+                   for name in wanted if self.values[name] != before[name]]
+        if changed:
+            note("wrote " + ", ".join(changed))
