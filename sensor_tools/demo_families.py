@@ -1,0 +1,164 @@
+"""What the demonstration shows: one row per sensor, and how its measurements meet the truth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import KW_ONLY, dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from isys_radar_driver.models import FAST, find_model
+from isys_radar_driver.simulator import scene_of
+from msg_conversions.point_cloud import FIELD_NAMES
+from sensor_tools import demo_picture
+
+Array = npt.NDArray[np.float64]
+
+TIMING = 0.010  # s by which a stamp may be off
+ENOUGH = 0.95  # share of the values that must be within their tolerance
+
+
+@dataclass(frozen=True)
+class Program:
+    """`main` of a module with its arguments.
+
+    "{directory}" in an argument stands for a directory that the programs of a demonstration share
+    and that vanishes with them, "{port}" for a free TCP port, the same for a whole family.
+    """
+
+    module: str
+    arguments: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Topic:
+    """A topic to record: its message type, and the expected messages per second."""
+
+    name: str
+    kind: str
+    rate: float
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Measured values beside the truth. The arrays have one entry per value.
+
+    Attributes:
+        quantity: What was measured, with its unit.
+        error_name: What the error is, with its unit.
+        seconds: When, since the first value.
+        tracks: Index of the curve that a value belongs to.
+        names: Name of each curve.
+        measured: The values; NaN where one is missing.
+        errors: Distance from the truth; infinite where a value is missing.
+        tolerances: Largest error that resolution and timing explain.
+        places: Positions (x, y) in m, if the sensor tells any.
+        curve_seconds: Times of the curves, which are the truth.
+        curves: Their values, one row per time and one column per track.
+        curve_places: Positions of the truth.
+    """
+
+    quantity: str
+    error_name: str
+    _: KW_ONLY
+    seconds: Array
+    tracks: npt.NDArray[np.int64]
+    names: Sequence[str]
+    measured: Array
+    errors: Array
+    tolerances: Array
+    curve_seconds: Array
+    curves: Array
+    places: Array = field(default_factory=lambda: np.empty((0, 2)))
+    curve_places: Array = field(default_factory=lambda: np.empty((0, 0, 2)))
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the measurements agree with the truth."""
+        return bool(np.mean(self.errors <= self.tolerances) >= ENOUGH)
+
+    def __str__(self) -> str:
+        """Say how well the measurements agree with the truth, in one line."""
+        half, most = np.quantile(self.errors, (0.5, ENOUGH), method="higher")
+        within = np.count_nonzero(self.errors <= self.tolerances)
+        return (f"{within} of {self.errors.size} values within resolution and {TIMING * 1e3:g} ms "
+                f"of motion of the truth; {self.error_name}: median {half:.3g}, "
+                f"95 % below {most:.3g}, allowed {np.min(self.tolerances):.3g} to "
+                f"{np.max(self.tolerances):.3g}")
+
+
+@dataclass(frozen=True)
+class Family:
+    """One sensor of the demonstration.
+
+    Attributes:
+        name: What people call it.
+        simulator: Stands in for the hardware.
+        node: The driver.
+        topics: What the driver publishes; the first one is compared with the truth and drawn.
+        compare: Turns the messages of the first topic into a comparison.
+        panels: What is drawn of it, from left to right.
+    """
+
+    name: str
+    simulator: Program
+    node: Program
+    topics: tuple[Topic, ...]
+    compare: Callable[[Sequence[Any]], Comparison]
+    panels: tuple[demo_picture.Panel, ...]
+
+
+def seconds_of(message: Any) -> float:
+    """Return the time of measurement in s since the epoch."""
+    return float(message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec)
+
+
+RADAR = find_model("iSYS-4001")
+RANGE_STEP, ANGLE_STEP = 0.01, math.radians(0.01)  # the coarser of its target lists
+
+
+def compare_radar(messages: Sequence[Any]) -> Comparison:
+    """Compare point clouds with the simulator's scene: each target with the nearest point."""
+    scene = scene_of(RADAR)
+
+    def truth(now: float) -> Array:
+        return np.array([(target.range * math.cos(target.angle),
+                          target.range * math.sin(target.angle)) for target in scene(now)])
+
+    times = np.array([seconds_of(message) for message in messages])
+    rows = []
+    for now, message in zip(times, messages, strict=True):
+        points = np.frombuffer(message.data, "<f4").reshape(-1, len(FIELD_NAMES))[:, :2]
+        speeds = np.linalg.norm(truth(now + 1e-3) - truth(now - 1e-3), axis=1) / 2e-3
+        for track, (place, speed) in enumerate(zip(truth(now), speeds, strict=True)):
+            distances = np.linalg.norm(points - place, axis=1)
+            x, y = points[distances.argmin()] if points.size else (math.nan, math.nan)
+            resolution = RANGE_STEP + math.hypot(*place) * ANGLE_STEP
+            rows.append((now, track, x, y, distances.min(initial=math.inf),
+                         resolution + TIMING * speed))
+    seconds, tracks, x, y, errors, tolerances = np.array(rows, float).T
+    curve_times = np.linspace(times[0], times[-1], 2 * len(times))
+    curve_places = np.array([truth(now) for now in curve_times])
+    return Comparison(
+        "range [m]", "position error [mm]", seconds=seconds - times[0], tracks=tracks.astype(int),
+        names=[f"target {track + 1}" for track in range(curve_places.shape[1])],
+        measured=np.hypot(x, y), errors=1e3 * errors, tolerances=1e3 * tolerances,
+        places=np.stack((x, y), axis=1), curve_seconds=curve_times - times[0],
+        curves=np.linalg.norm(curve_places, axis=2), curve_places=curve_places)
+
+
+FAMILIES = (
+    Family(
+        f"{RADAR.name} radar",
+        Program("sensor_tools.simulate",
+                ("isys", "--model", RADAR.name, "--link", "{directory}/radar")),
+        Program("isys_radar_driver.node",
+                ("--ros-args", "-p", "serial_port:={directory}/radar")),
+        (Topic("/isys_radar/points", "sensor_msgs/msg/PointCloud2",
+               1 / RADAR.cycle_time(FAST)),),
+        compare_radar,
+        (demo_picture.top_view, demo_picture.over_time, demo_picture.errors_over_time)),
+)
