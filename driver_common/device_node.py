@@ -278,6 +278,17 @@ class DeviceNode(LifecycleNode):
         self._entities.append(lambda: self.destroy_publisher(publisher))
         return publisher
 
+    def while_running(self, publish: Callable[..., None]) -> Callable[..., None]:
+        """Return `publish`, doing nothing once the context was shut down under the bus thread."""
+        def call(*args: Any) -> None:
+            try:
+                publish(*args)
+            except Exception:
+                if self.context.ok():
+                    raise
+
+        return call
+
     def add_trigger(self, sensor: str, name: str, action: Callable[[], str]) -> None:
         """Create a service which runs `action` and answers with its text, or with its error."""
         def handle(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

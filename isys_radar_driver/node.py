@@ -227,8 +227,8 @@ class IsysRadarNode(DeviceNode, Listener):
 
     def _publish(self, radar: Radar, topic: str, message: Any) -> None:
         publisher = self._publishers_of[radar.options.name].get(topic)
-        if publisher is not None and self.context.ok():
-            publisher.publish(message)
+        if publisher is not None:
+            self.while_running(publisher.publish)(message)
 
     def _frame_and_stamp(self, radar: Radar, stamp: int) -> tuple[str, int]:
         sensor = radar.options.name

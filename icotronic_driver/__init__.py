@@ -1,0 +1,1 @@
+"""ROS 2 driver of the ICOtronic wireless accelerometers."""

@@ -1,0 +1,861 @@
+"""Commands of the MyTooliT protocol (section 10): requests, and what their answers mean.
+
+A `Command` is a row: `request` turns it into a `Request`, which knows the frame to send, which
+frame answers it, and what that says. Texts, numbers and units are those of people; bytes are only
+inside.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass, field
+from enum import IntEnum
+from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
+
+from driver_common.errors import FrameError, RefusedError, SettingError
+from driver_common.settings import Raw, Record
+from icotronic_driver.identifier import SPU_1, STH_1, Frame, Identifier, node_name
+from icotronic_driver.streaming import STOP, StreamFormat, decode_single
+
+P = ParamSpec("P")
+T = TypeVar("T")
+Result = TypeVar("Result")
+
+SYSTEM, STREAMING, STATISTICS = 0x00, 0x04, 0x08
+CONFIGURATION, EEPROM, PRODUCT_DATA, TEST = 0x28, 0x3D, 0x3E, 0x3F
+
+SELF = 0xFF  # device number: the node itself, not one that it sees
+NAME_LENGTH, FIRST_PART = 8, 6  # bytes of a name, and how many the first frame carries
+EEPROM_CHUNK = 4  # errata C10
+CLOCK = 38.4e6  # Hz, of the ADC
+ADVERTISEMENT_STEP = 0.625e-3  # s
+TEMPERATURE_REFERENCE = 1.25  # V; with it the temperature comes in m°C
+
+ERRORS = {0: "specific error", 1: "not available", 2: "general error", 3: "write not allowed",
+          4: "unsupported format", 5: "wrong key or magic number",
+          6: "no super frame inside a super frame"}  # section 10.9
+_STATE_REASONS = {1: "set state not available", 2: "wrong subscriber"}  # section 10.2.3.1
+
+
+# --- values ---
+
+class NetworkState(IntEnum):
+    """State of a node in the network (sections 10.2.3.1 and 10.2.4)."""
+
+    FAILURE = 0
+    ERROR = 1
+    STANDBY = 2
+    GRACEFUL_DEGRADATION_2 = 3
+    GRACEFUL_DEGRADATION_1 = 4
+    OPERATING = 5
+    STARTUP = 6
+    NO_CHANGE = 7
+
+
+class CodeLocation(IntEnum):
+    """Which program of a node runs (section 10.2.3.1)."""
+
+    NO_CHANGE = 0
+    BOOTLOADER = 1
+    APPLICATION = 2
+    RESERVED = 3
+
+
+class State(NamedTuple):
+    """What a node runs, and in which state."""
+
+    location: CodeLocation
+    state: NetworkState
+
+
+@dataclass(frozen=True)
+class NodeStatus:
+    """Node status word (section 10.2.4); what only a stationary unit has is None for a sensor."""
+
+    error: bool
+    state: NetworkState
+    radio_enabled: bool | None = None
+    can_enabled: bool | None = None
+    radio_connected: bool | None = None
+
+
+@dataclass(frozen=True)
+class ErrorStatus:
+    """Error status word (section 10.2.5); transmission is Bluetooth for a sensor, else CAN."""
+
+    transmission_failed: bool
+    adc_overrun: bool | None = None
+
+
+class EnergyTimes(NamedTuple):
+    """Times of an energy mode in s: until it begins, and between two advertisements in it."""
+
+    sleep: float
+    advertisement: float
+
+
+class PowerCycles(NamedTuple):
+    """How often the power was switched on (resets count as well) and lost."""
+
+    on: int
+    off: int
+
+
+class OperatingTime(NamedTuple):
+    """Operating time in s."""
+
+    since_reset: int
+    since_first_power_on: int
+
+
+class Version(NamedTuple):
+    """Version of hardware or firmware."""
+
+    major: int
+    minor: int
+    patch: int
+
+    def __str__(self) -> str:
+        """Return for example "2.1.10"."""
+        return f"{self.major}.{self.minor}.{self.patch}"
+
+
+class UsedSensors(NamedTuple):
+    """Numbers of the sensors on the three channels; 0 in a write leaves the channel as it is."""
+
+    x: int
+    y: int
+    z: int
+
+
+class CalibrationElement(IntEnum):
+    """What a calibration factor or measurement belongs to (sections 10.5.3.1 and 10.5.5.1)."""
+
+    ACCELERATION = 0
+    TEMPERATURE = 1
+    VOLTAGE = 32
+    GROUND = 96
+    SUPPLY = 97
+    REGULATED_POWER = 98
+    AMPLIFIER_OUTPUT = 99
+
+
+class CalibrationMethod(IntEnum):
+    """What a calibration measurement does (section 10.5.5.1)."""
+
+    RESERVED = 0
+    ACTIVATE = 1
+    DEACTIVATE = 2
+    MEASURE = 3
+
+
+class Signal(NamedTuple):
+    """A test signal: shape 1 is a line, 2 a ramp (section 10.8.1)."""
+
+    shape: int
+    module: int
+    content: bytes
+
+
+ACQUISITION_TIMES = (1, 2, 3, 4, 8, 16, 32, 64, 128, 256)  # cycles, by code
+OVERSAMPLING_RATES = tuple(1 << code for code in range(13))  # by code
+REFERENCE_STEP = 0.05  # V
+REFERENCE_VOLTAGES = (1.25, 1.65, 1.8, 2.1, 2.2, 2.5, 2.7, 3.3, 5.0, 6.6)
+PRESCALERS = range(1, 128)
+
+
+@dataclass(frozen=True)
+class AdcConfiguration:
+    """How the ADC samples (section 10.5.1); the default is what it has after a reset.
+
+    Attributes:
+        prescaler: Divider of the clock, 1 … 127.
+        acquisition_time: Clock cycles in which the signal is taken, one of `ACQUISITION_TIMES`.
+        oversampling_rate: Conversions that make a value, one of `OVERSAMPLING_RATES`.
+        reference_voltage: In V, one of `REFERENCE_VOLTAGES`.
+    """
+
+    prescaler: int = 2
+    acquisition_time: int = 8
+    oversampling_rate: int = 64
+    reference_voltage: float = 3.3
+
+    @property
+    def sample_rate(self) -> float:
+        """Values per s, shared by the active channels (section 10.5.1.1.1)."""
+        return CLOCK / ((self.prescaler + 1) * (self.acquisition_time + 13)
+                        * self.oversampling_rate)
+
+    def encode(self) -> bytes:
+        """Return the four codes.
+
+        Raises:
+            SettingError: The ADC has no such value.
+        """
+        _require("prescaler", self.prescaler, PRESCALERS)
+        _require("acquisition time", self.acquisition_time, ACQUISITION_TIMES)
+        _require("oversampling rate", self.oversampling_rate, OVERSAMPLING_RATES)
+        return bytes((self.prescaler, ACQUISITION_TIMES.index(self.acquisition_time),
+                      OVERSAMPLING_RATES.index(self.oversampling_rate),
+                      _reference_code(self.reference_voltage)))
+
+    @classmethod
+    def decode(cls, data: bytes) -> AdcConfiguration:
+        """Return what four codes say.
+
+        Raises:
+            FrameError: A code means nothing.
+        """
+        prescaler, acquisition, oversampling, reference = _exactly(data, "BBBB")
+        try:
+            return cls(prescaler, ACQUISITION_TIMES[acquisition], OVERSAMPLING_RATES[oversampling],
+                       reference / 20)
+        except IndexError:
+            raise FrameError(f"ADC configuration {data.hex(' ').upper()} makes no sense") from None
+
+
+def _reference_code(voltage: float) -> int:
+    _require("reference voltage", voltage, REFERENCE_VOLTAGES)
+    return round(voltage / REFERENCE_STEP)
+
+
+def _require(what: str, value: float, allowed: Sequence[float]) -> None:
+    if value not in allowed:
+        shown = (f"{allowed[0]} … {allowed[-1]}" if isinstance(allowed, range)
+                 else ", ".join(f"{one:g}" for one in allowed))
+        raise SettingError(f"the ADC has no {what} {value:g}, allowed is {shown}")
+
+
+# --- bytes in and out ---
+
+def _exactly(data: bytes, form: str) -> tuple[int, ...]:
+    size = struct.calcsize(form)
+    if len(data) != size:
+        raise FrameError(f"answer carries {len(data)} bytes instead of {size}: "
+                         f"{data.hex(' ').upper()}")
+    return struct.unpack(form, data)
+
+
+def _bytes(data: bytes) -> bytes:
+    _exactly(data, "8s")
+    return bytes(data)
+
+
+def _done(data: bytes) -> None:
+    """Accept any answer: what it carries says nothing."""
+
+
+def _nothing() -> bytes:
+    return bytes(8)  # errata C3
+
+
+def _empty() -> bytes:
+    return b""
+
+
+def decode_text(data: bytes) -> str:
+    """Return the text in bytes that are padded with zeros (errata C13)."""
+    return data.split(b"\0", 1)[0].decode("utf-8", errors="replace")
+
+
+def encode_text(text: str, length: int) -> bytes:
+    """Return a text as UTF-8, padded with zeros (errata C13).
+
+    Raises:
+        SettingError: The text is too long or holds a zero.
+    """
+    data = text.encode()
+    if len(data) > length or b"\0" in data:
+        raise SettingError(f'"{text}" does not fit, it may have at most {length} bytes in UTF-8 '
+                           "and no zero")
+    return data.ljust(length, b"\0")
+
+
+def encode_mac(address: str) -> bytes:
+    """Return the six bytes of a MAC address like "08:6B:D7:01:DE:81".
+
+    Raises:
+        SettingError: Not a MAC address.
+    """
+    parts = address.replace("-", ":").split(":")
+    try:
+        if len(parts) == 6 and all(len(part) == 2 for part in parts):
+            return bytes(int(part, 16) for part in parts)
+    except ValueError:
+        pass
+    raise SettingError(f'"{address}" is not a MAC address such as 08:6B:D7:01:DE:81')
+
+
+def decode_mac(data: bytes) -> str:
+    """Return the text of six bytes, like "08:6B:D7:01:DE:81"."""
+    return data.hex(":").upper()
+
+
+# --- the row ---
+
+@dataclass(frozen=True)
+class Request(Generic[T]):
+    """A request on its way.
+
+    Attributes:
+        name: What it asks for, in words.
+        frame: What is to be sent.
+        mask: Which bits of the request's first bytes the acknowledgement repeats.
+        decode: Turns the acknowledgement's payload into the result; raises FrameError.
+        reasons: Numbers of specific errors in words.
+    """
+
+    name: str
+    frame: Frame
+    mask: bytes
+    decode: Callable[[bytes], T]
+    reasons: Mapping[int, str] = field(default_factory=dict)
+
+    @property
+    def acknowledgement_id(self) -> int:
+        """CAN identifier of the acknowledgement."""
+        return self.frame.identifier.acknowledgement().encode()
+
+    @property
+    def error_id(self) -> int:
+        """CAN identifier of the error acknowledgement."""
+        return self.frame.identifier.acknowledgement(error=True).encode()
+
+    def is_answered_by(self, can_id: int, data: bytes | bytearray) -> bool:
+        """Whether a frame is the answer: by its identifier, and by what it repeats (errata C5)."""
+        if can_id == self.error_id:
+            return True
+        return can_id == self.acknowledgement_id and all(
+            (sent ^ received) & mask == 0
+            for sent, received, mask in zip(self.frame.data, data, self.mask, strict=False))
+
+    def result(self, can_id: int, data: bytes | bytearray) -> T:
+        """Return what the answer says.
+
+        Raises:
+            RefusedError: It is an error acknowledgement; the text says which error.
+            FrameError: Its length or content is wrong.
+        """
+        if can_id == self.error_id:
+            raise RefusedError(f"{node_name(self.frame.identifier.receiver)} cannot {self.name}: "
+                               f"{self._error(bytes(data))}")
+        try:
+            return self.decode(bytes(data))
+        except FrameError as error:
+            raise FrameError(f"{self.name}: {error}") from None
+
+    def _error(self, data: bytes) -> str:
+        """Return the error in words (errata C12)."""
+        if len(data) > 1 and data[1] in self.reasons:
+            return f"{self.reasons[data[1]]} (error {data.hex(' ').upper()})"
+        if not data:
+            return "error without a number"
+        return f"{ERRORS.get(data[0], f'unknown error {data[0]}')} (error {data.hex(' ').upper()})"
+
+
+@dataclass(frozen=True, eq=False)  # a row is itself only, so it can be hashed
+class Command(Generic[P, T]):
+    """A command: how it is asked, and how the answer is understood.
+
+    Attributes:
+        name: What it does, in words.
+        block: Command block.
+        block_command: Command within the block.
+        encode: Turns the arguments into the request's payload; raises SettingError.
+        decode: Turns the acknowledgement's payload into the result; raises FrameError.
+        mask: Which bits of the request's first bytes the acknowledgement repeats.
+        reasons: Numbers of specific errors in words.
+        section: Section of the manual.
+    """
+
+    name: str
+    block: int
+    block_command: int
+    encode: Callable[P, bytes]
+    decode: Callable[[bytes], T]
+    _: KW_ONLY
+    mask: bytes = b""
+    reasons: Mapping[int, str] = field(default_factory=dict)
+    section: str
+
+    def request(self, receiver: int, *args: P.args, **kwargs: P.kwargs) -> Request[T]:
+        """Return the request of this host to a node."""
+        return self.with_payload(receiver, self.encode(*args, **kwargs), self.decode)
+
+    def with_payload(self, receiver: int, payload: bytes,
+                     decode: Callable[[bytes], Result]) -> Request[Result]:
+        """Return a request with this payload, whose answer is understood by `decode`."""
+        identifier = Identifier(self.block, self.block_command, SPU_1, receiver)
+        return Request(self.name, Frame(identifier, payload), self.mask, decode, self.reasons)
+
+
+# --- system (section 10.2) ---
+
+def _set_state(state: NetworkState, location: CodeLocation = CodeLocation.NO_CHANGE) -> bytes:
+    return bytes((0x80 | location << 4 | state,))
+
+
+def _state(data: bytes) -> State:
+    if not data:
+        raise FrameError("the state is missing")
+    return State(CodeLocation(data[0] >> 4 & 3), NetworkState(data[0] & 7))
+
+
+def _word(data: bytes) -> int:
+    """Return a status word; its mask, in the bytes behind it, is not used."""
+    return struct.unpack("<I", _bytes(data)[:4])[0]  # type: ignore[no-any-return]
+
+
+def _sth_status(data: bytes) -> NodeStatus:
+    word = _word(data)
+    return NodeStatus(bool(word & 1), NetworkState(word >> 1 & 7))
+
+
+def _stu_status(data: bytes) -> NodeStatus:
+    word = _word(data)
+    return NodeStatus(bool(word & 1), NetworkState(word >> 1 & 7), bool(word & 0x10),
+                      bool(word & 0x20), bool(word & 0x40))
+
+
+def _sth_errors(data: bytes) -> ErrorStatus:
+    word = _word(data)
+    return ErrorStatus(bool(word & 1), bool(word & 2))
+
+
+def _stu_errors(data: bytes) -> ErrorStatus:
+    return ErrorStatus(bool(_word(data) & 1))
+
+
+RESET = Command("reset", SYSTEM, 0x01, _empty, _done, section="10.2.2")
+READ_STATE = Command("read the state", SYSTEM, 0x02, lambda: b"\0", _state,
+                     reasons=_STATE_REASONS, section="10.2.3")
+WRITE_STATE = Command("set the state", SYSTEM, 0x02, _set_state, _state,
+                      reasons=_STATE_REASONS, section="10.2.3")
+READ_STH_STATUS = Command("read the node status", SYSTEM, 0x05, _nothing, _sth_status,
+                          section="10.2.4")
+READ_STU_STATUS = Command("read the node status", SYSTEM, 0x05, _nothing, _stu_status,
+                          section="10.2.4")
+READ_STH_ERRORS = Command("read the error status", SYSTEM, 0x06, _nothing, _sth_errors,
+                          section="10.2.5")
+READ_STU_ERRORS = Command("read the error status", SYSTEM, 0x06, _nothing, _stu_errors,
+                          section="10.2.5")
+
+
+# --- Bluetooth (section 10.2.6) ---
+
+_SUBCOMMAND_AND_NUMBER, _SUBCOMMAND, _ANY = b"\xff\xff", b"\xff", b""  # errata C5
+
+
+def _of_device(name: str, subcommand: int, decode: Callable[[bytes], T], *,
+               mask: bytes = _SUBCOMMAND_AND_NUMBER) -> Command[[int], T]:
+    """Return a sub-command which is sent for a device number and carries no value."""
+    def encode(device: int) -> bytes:
+        return bytes((subcommand, device)) + bytes(6)
+
+    return Command(name, SYSTEM, 0x0B, encode, lambda data: decode(_bytes(data)[2:]), mask=mask,
+                   section="10.2.6")
+
+
+def _bluetooth(name: str, subcommand: int, decode: Callable[[bytes], T], *,
+               number: int = 0) -> Command[[], T]:
+    """Return a sub-command which needs no device number and carries no value."""
+    payload = bytes((subcommand, number)) + bytes(6)
+    return Command(name, SYSTEM, 0x0B, lambda: payload, lambda data: decode(_bytes(data)[2:]),
+                   mask=_SUBCOMMAND_AND_NUMBER, section="10.2.6")
+
+
+def _name_part(name: str, subcommand: int, mask: bytes) -> Command[[int, bytes], None]:
+    def encode(device: int, part: bytes) -> bytes:
+        return bytes((subcommand, device)) + part.ljust(6, b"\0")
+
+    return Command(name, SYSTEM, 0x0B, encode, _done, mask=mask, section="10.2.6")
+
+
+def _write_energy(name: str, subcommand: int) -> Command[[float, float], EnergyTimes]:
+    def encode(sleep: float, advertisement: float) -> bytes:
+        values = round(sleep * 1000), round(advertisement / ADVERTISEMENT_STEP)
+        if not (0 < values[0] < 1 << 32 and 0 < values[1] < 1 << 16):
+            raise SettingError(f"sleep time {sleep:g} s and advertisement time {advertisement:g} s "
+                               "are not possible, allowed is more than 0 up to 4294967.295 s "
+                               "and up to 40.959375 s")  # zeros would be a read
+        return bytes((subcommand, SELF)) + struct.pack("<IH", *values)
+
+    return Command(name, SYSTEM, 0x0B, encode, lambda data: _energy_times(_bytes(data)[2:]),
+                   mask=_ANY, section="10.2.6")
+
+
+def _energy_times(value: bytes) -> EnergyTimes:
+    sleep, advertisement = struct.unpack("<IH", value)  # errata C11
+    return EnergyTimes(sleep / 1000, round(advertisement * ADVERTISEMENT_STEP, 9))
+
+
+def _device_count(value: bytes) -> int:
+    text = decode_text(value).strip()
+    if not text.isdecimal():
+        raise FrameError(f"the number of devices is not in digits: {value.hex(' ').upper()}")
+    return int(text)
+
+
+def _mac(value: bytes) -> str:
+    return decode_mac(value[::-1])
+
+
+def _connect_mac(address: str) -> bytes:
+    return bytes((18, 0)) + encode_mac(address)[::-1]
+
+
+ACTIVATE_BLUETOOTH = _bluetooth("activate Bluetooth", 1, _done)
+COUNT_DEVICES = _bluetooth("get the number of available devices", 2, _device_count)
+WRITE_NAME_1 = _name_part("write the first part of the name", 3, _SUBCOMMAND_AND_NUMBER)
+WRITE_NAME_2 = _name_part("write the second part of the name", 4, _SUBCOMMAND)
+READ_NAME_1 = _of_device("read the first part of the name", 5, bytes)
+READ_NAME_2 = _of_device("read the second part of the name", 6, lambda value: value[:2])
+CONNECT_NUMBER = _of_device("connect by number", 7, lambda value: bool(value[0]))
+CHECK_CONNECTED = _bluetooth("check if connected", 8, lambda value: bool(value[0]))
+DEACTIVATE_BLUETOOTH = _bluetooth("deactivate Bluetooth", 9, _done)
+READ_SEND_COUNTER = _bluetooth("read the send counter", 10,
+                               lambda value: int.from_bytes(value, "big"))
+READ_RECEIVE_COUNTER = _bluetooth("read the number of received frames", 11,
+                                  lambda value: int.from_bytes(value, "big"))
+READ_RSSI = _of_device("read the RSSI", 12,
+                       lambda value: int.from_bytes(value[:1], "little", signed=True))  # dBm
+READ_REDUCED_ENERGY = _bluetooth("read the times of the reduced energy mode", 13, _energy_times,
+                                 number=SELF)
+WRITE_REDUCED_ENERGY = _write_energy("write the times of the reduced energy mode", 14)
+READ_LOWEST_ENERGY = _bluetooth("read the times of the lowest energy mode", 15, _energy_times,
+                                number=SELF)
+WRITE_LOWEST_ENERGY = _write_energy("write the times of the lowest energy mode", 16)
+READ_MAC = _of_device("read the MAC address", 17, _mac, mask=_SUBCOMMAND)
+CONNECT_MAC = Command("connect by MAC address", SYSTEM, 0x0B, _connect_mac,
+                      lambda data: _mac(_bytes(data)[2:]), mask=_SUBCOMMAND_AND_NUMBER,
+                      section="10.2.6")
+
+
+def decode_name(first: bytes, second: bytes) -> str:
+    """Return the name whose two parts were read; a character may be cut by their border."""
+    return decode_text(first + second)
+
+
+def encode_name(name: str) -> tuple[bytes, bytes]:
+    """Return the two parts in which a name is written.
+
+    Raises:
+        SettingError: It does not fit 8 bytes.
+    """
+    data = encode_text(name, NAME_LENGTH)
+    return data[:FIRST_PART], data[FIRST_PART:]
+
+
+# --- streaming (section 10.3) ---
+
+def _stream(format: StreamFormat) -> bytes:
+    return bytes((format.encode(),))
+
+
+def _stop() -> bytes:
+    return bytes((STOP.encode(),))
+
+
+_DATA_SETS_ONLY = b"\x07"  # a stop is known by its data sets: 0
+
+# The answer to the start of a stream is its first data frame (errata C6).
+START_ACCELERATION = Command("start the stream", STREAMING, 0x00, _stream, _done, mask=b"\xff",
+                             section="10.3.2")
+STOP_ACCELERATION = Command("stop the stream", STREAMING, 0x00, _stop, _done,
+                            mask=_DATA_SETS_ONLY, section="10.3.2")
+START_VOLTAGE = Command("start the voltage stream", STREAMING, 0x20, _stream, _done, mask=b"\xff",
+                        section="10.3.3")
+STOP_VOLTAGE = Command("stop the voltage stream", STREAMING, 0x20, _stop, _done,
+                       mask=_DATA_SETS_ONLY, section="10.3.3")
+
+ACCELERATION_DATA = Identifier(STREAMING, 0x00, STH_1, SPU_1, request=False)
+VOLTAGE_DATA = Identifier(STREAMING, 0x20, STH_1, SPU_1, request=False)
+
+_SINGLE_ACCELERATION = Command("read single values", STREAMING, 0x00, _stream, _done,
+                               mask=b"\xff", section="10.3.2")
+_SINGLE_VOLTAGE = Command("read single voltages", STREAMING, 0x20, _stream, _done, mask=b"\xff",
+                          section="10.3.3")
+
+
+def read_acceleration(receiver: int, channels: tuple[bool, bool, bool] = (True, True, True),
+                      data_sets: int = 1, value_size: int = 2) -> Request[tuple[int, ...]]:
+    """Return the request for single raw values, oldest first (section 10.3.2)."""
+    return _single(_SINGLE_ACCELERATION, receiver,
+                   StreamFormat(channels, data_sets, value_size, stream=False))
+
+
+def read_voltage(receiver: int, channels: tuple[bool, bool, bool] = (True, False, False),
+                 data_sets: int = 1, value_size: int = 2) -> Request[tuple[int, ...]]:
+    """Return the request for single raw voltages; voltage 1 is the battery (section 10.3.3)."""
+    return _single(_SINGLE_VOLTAGE, receiver,
+                   StreamFormat(channels, data_sets, value_size, stream=False))
+
+
+def _single(command: Command[[StreamFormat], None], receiver: int,
+            format: StreamFormat) -> Request[tuple[int, ...]]:
+    return command.with_payload(receiver, _stream(format),
+                                lambda data: decode_single(format, data))
+
+
+# --- statistics (section 10.4) ---
+
+def _statistics(name: str, block_command: int, decode: Callable[[bytes], T],
+                section: str) -> Command[[], T]:
+    return Command(name, STATISTICS, block_command, _nothing, decode, section=section)
+
+
+def _counter(data: bytes) -> int:
+    """Return the number in the first four bytes; more may follow them."""
+    if len(data) not in (4, 8):
+        raise FrameError(f"answer carries {len(data)} bytes instead of 4 or 8: "
+                         f"{data.hex(' ').upper()}")
+    return int.from_bytes(data[:4], "big")
+
+
+def _production_date(data: bytes) -> str:
+    text = decode_text(_bytes(data))
+    return f"{text[:4]}-{text[4:6]}-{text[6:]}" if len(text) == 8 and text.isdecimal() else text
+
+
+READ_POWER_CYCLES = _statistics("read the power cycles", 0x00,
+                                lambda data: PowerCycles(*_exactly(data, ">II")), "10.4.1")
+READ_OPERATING_TIME = _statistics("read the operating time", 0x01,
+                                  lambda data: OperatingTime(*_exactly(data, ">II")), "10.4.2")
+READ_UNDER_VOLTAGES = _statistics("read the under voltage counter", 0x02, _counter, "10.4.3")
+READ_WATCHDOG_RESETS = _statistics("read the watchdog reset counter", 0x03, _counter, "10.4.4")
+READ_PRODUCTION_DATE = _statistics("read the production date", 0x04, _production_date, "10.4.5")
+
+
+# --- configuration (section 10.5) ---
+
+_ELEMENT_AND_AXIS, _HIDDEN_FIRST = b"\xff\xff", b"\x00\xff\xff"
+
+
+def _adc(data: bytes) -> AdcConfiguration:
+    return AdcConfiguration.decode(_bytes(data)[1:5])
+
+
+def _write_adc(configuration: AdcConfiguration) -> bytes:
+    return b"\x80" + configuration.encode() + bytes(3)
+
+
+def _used_sensors(data: bytes) -> UsedSensors:
+    return UsedSensors(*_bytes(data)[1:4])
+
+
+def _write_used_sensors(sensors: UsedSensors) -> bytes:
+    if not all(0 <= number <= 255 for number in sensors):
+        raise SettingError(f"sensor numbers {sensors} are not possible, allowed is 0 … 255")
+    return bytes((0x80, *sensors)) + bytes(4)
+
+
+def _factor(element: CalibrationElement, axis: int) -> bytes:
+    return bytes((element, axis)) + bytes(6)
+
+
+def _write_factor(element: CalibrationElement, axis: int, value: float) -> bytes:
+    if not math.isfinite(value):
+        raise SettingError(f"a calibration factor must be a finite number, not {value}")
+    return bytes((element, axis, 0x80, 0)) + struct.pack(">f", value)
+
+
+def _factor_value(data: bytes) -> float:
+    return struct.unpack(">f", _bytes(data)[4:])[0]  # type: ignore[no-any-return]
+
+
+def _measurement(element: CalibrationElement, dimension: int = 1,
+                 reference_voltage: float = 3.3,
+                 method: CalibrationMethod = CalibrationMethod.MEASURE, *,
+                 reset: bool = False) -> bytes:
+    return bytes((0x80 | method << 5 | reset << 4, element, dimension,
+                  _reference_code(reference_voltage))) + bytes(4)
+
+
+def _celsius(data: bytes) -> float:
+    return int.from_bytes(_bytes(data)[4:], "little", signed=True) / 1000
+
+
+def _read_led(number: int = 0) -> bytes:
+    return bytes((0x01, number)) + bytes(6)
+
+
+def _write_led(on: bool, number: int = 0) -> bytes:
+    return bytes((0x81, number, 1 if on else 2)) + bytes(5)
+
+
+def _led(data: bytes) -> bool:
+    code = _bytes(data)[2]
+    if code not in (1, 2):
+        raise FrameError(f"LED state {code} is neither 1 (on) nor 2 (off)")
+    return code == 1
+
+
+READ_ADC = Command("read the ADC configuration", CONFIGURATION, 0x00, _nothing, _adc,
+                   section="10.5.1")
+WRITE_ADC = Command("write the ADC configuration", CONFIGURATION, 0x00, _write_adc, _adc,
+                    section="10.5.1")
+READ_USED_SENSORS = Command("read the used sensors", CONFIGURATION, 0x01, _nothing, _used_sensors,
+                            section="10.5.2")
+WRITE_USED_SENSORS = Command("write the used sensors", CONFIGURATION, 0x01,
+                             _write_used_sensors, _used_sensors, section="10.5.2")
+READ_CALIBRATION_K = Command("read a calibration factor k", CONFIGURATION, 0x60, _factor,
+                             _factor_value, mask=_ELEMENT_AND_AXIS, section="10.5.3")
+WRITE_CALIBRATION_K = Command("write a calibration factor k", CONFIGURATION, 0x60, _write_factor,
+                              _factor_value, mask=_ELEMENT_AND_AXIS, section="10.5.3")
+READ_CALIBRATION_D = Command("read a calibration factor d", CONFIGURATION, 0x61, _factor,
+                             _factor_value, mask=_ELEMENT_AND_AXIS, section="10.5.4")
+WRITE_CALIBRATION_D = Command("write a calibration factor d", CONFIGURATION, 0x61, _write_factor,
+                              _factor_value, mask=_ELEMENT_AND_AXIS, section="10.5.4")
+MEASURE = Command("make a calibration measurement", CONFIGURATION, 0x62, _measurement,
+                  lambda data: int.from_bytes(_bytes(data)[4:], "little"), mask=_HIDDEN_FIRST,
+                  section="10.5.5")
+READ_TEMPERATURE = Command(
+    "read the temperature", CONFIGURATION, 0x62,
+    lambda: _measurement(CalibrationElement.TEMPERATURE, 1, TEMPERATURE_REFERENCE), _celsius,
+    mask=_HIDDEN_FIRST, section="10.5.5")
+READ_LED = Command("read the LED", CONFIGURATION, 0xC0, _read_led, _led, mask=b"\x00\xff",
+                   section="10.5.6")
+WRITE_LED = Command("write the LED", CONFIGURATION, 0xC0, _write_led, _led, mask=b"\x00\xff",
+                    section="10.5.6")
+
+
+# --- EEPROM (section 10.6) ---
+
+_PAGE_OFFSET_LENGTH = b"\xff\xff\xff"
+
+
+def _read_eeprom(page: int, offset: int, length: int) -> bytes:
+    _check_area(page, offset, length)
+    return bytes((page, offset, length)) + bytes(5)
+
+
+def _write_eeprom(page: int, offset: int, content: bytes) -> bytes:
+    _check_area(page, offset, len(content))
+    return bytes((page, offset, len(content), 0)) + content.ljust(EEPROM_CHUNK, b"\0")
+
+
+def _check_area(page: int, offset: int, length: int) -> None:
+    if not (0 <= page <= 255 and 0 <= offset <= 255 and 1 <= length <= EEPROM_CHUNK
+            and offset + length <= 256):
+        raise SettingError(f"{length} bytes at offset {offset} of EEPROM page {page} cannot be "
+                           f"accessed: 1 … {EEPROM_CHUNK} bytes within the 256 of a page can")
+
+
+def _eeprom_content(data: bytes) -> bytes:
+    length = _bytes(data)[2]
+    if not 1 <= length <= EEPROM_CHUNK:
+        raise FrameError(f"answer announces {length} bytes of the EEPROM: {data.hex(' ').upper()}")
+    return data[4:4 + length]
+
+
+READ_EEPROM = Command("read the EEPROM", EEPROM, 0x00, _read_eeprom, _eeprom_content,
+                      mask=_PAGE_OFFSET_LENGTH, section="10.6.1")
+WRITE_EEPROM = Command("write the EEPROM", EEPROM, 0x01, _write_eeprom, _eeprom_content,
+                       mask=_PAGE_OFFSET_LENGTH, section="10.6.2")
+READ_EEPROM_WRITES = Command("read the number of EEPROM writes", EEPROM, 0x20, _nothing,
+                             lambda data: int.from_bytes(_bytes(data)[4:], "little"),
+                             section="10.6.3")
+
+
+# --- product data (section 10.7) ---
+
+def _product(name: str, block_command: int, decode: Callable[[bytes], T],
+             section: str) -> Command[[], T]:
+    return Command(f"read {name}", PRODUCT_DATA, block_command, _nothing, decode, section=section)
+
+
+def _parts(name: str, first: int, count: int, section: str) -> tuple[Command[[], bytes], ...]:
+    return tuple(_product(f"part {index + 1} of {name}", first + index, _bytes, section)
+                 for index in range(count))
+
+
+def _version(data: bytes) -> Version:
+    return Version(*_bytes(data)[5:])
+
+
+# Like all numbers of the EEPROM it is little endian for the vendor's client; the manual says big.
+READ_GTIN = _product("the GTIN", 0x00, lambda data: int.from_bytes(_bytes(data), "little"),
+                     "10.7.1")
+READ_HARDWARE_VERSION = _product("the hardware version", 0x01, _version, "10.7.2")
+READ_FIRMWARE_VERSION = _product("the firmware version", 0x02, _version, "10.7.3")
+READ_RELEASE_NAME = _product("the release name", 0x03, decode_text, "10.7.4")
+READ_SERIAL_NUMBER = _parts("the serial number", 0x04, 4, "10.7.5")
+READ_PRODUCT_NAME = _parts("the product name", 0x08, 16, "10.7.6")
+READ_OEM_DATA = _parts("the OEM data", 0x18, 8, "10.7.7")
+READ_TOOL_RFID = _product("the tool's RFID product information", 0x80, bytes, "10.7.8")
+
+
+# --- test (section 10.8) ---
+
+def _test_signal(shape: int, module: int = 0, content: bytes = b"") -> bytes:
+    if shape not in (1, 2) or len(content) > 6:
+        raise SettingError(f"test signal {shape} with {len(content)} bytes is not possible: "
+                           "1 (line) and 2 (ramp) with up to 6 bytes are")
+    return bytes((shape, module)) + content.ljust(6, b"\0")
+
+
+def _signal(data: bytes) -> Signal:
+    return Signal(*struct.unpack("<BH5s", _bytes(data)))
+
+
+TEST_SIGNAL = Command("give a test signal", TEST, 0x01, _test_signal, _signal, mask=b"\xff",
+                      section="10.8.1")
+
+COMMANDS: tuple[Command[..., Any], ...] = tuple(
+    command for value in list(globals().values())
+    for command in (value if isinstance(value, tuple) else (value,))
+    if isinstance(command, Command))
+
+
+# --- blocks of settings ---
+
+@dataclass(frozen=True)
+class Part:
+    """What one pair of commands carries of a record.
+
+    Attributes:
+        read: Command that reads it.
+        write: Command that writes it.
+        read_head: First bytes of a reading request; the record's bytes are behind as many bytes of
+            its answer.
+        write_head: First bytes of a writing request, in front of the record's bytes.
+        size: How many of the record's bytes it carries.
+    """
+
+    read: Command[..., Any]
+    write: Command[..., Any]
+    read_head: bytes
+    write_head: bytes
+    size: int
+
+
+@dataclass(frozen=True)
+class IcotronicRecord(Record):
+    """A block of settings, read and written with one request per part."""
+
+    parts: tuple[Part, ...]
+
+    def read_requests(self, receiver: int) -> list[Request[bytes]]:
+        """Return the requests to read this record."""
+        return [part.read.with_payload(receiver, part.read_head.ljust(8, b"\0"),
+                                       _cut(len(part.read_head), part.size))
+                for part in self.parts]
+
+    def decode_answers(self, answers: Sequence[bytes]) -> tuple[Raw, ...]:
+        """Return the fields from the results of `read_requests`."""
+        return self.unpack(b"".join(answers))
+
+    def write_requests(self, receiver: int, values: Sequence[Raw]) -> list[Request[None]]:
+        """Return the requests to write this record."""
+        requests, data = [], self.pack(values)
+        for part in self.parts:
+            payload = part.write_head + data[:part.size]
+            requests.append(part.write.with_payload(receiver, payload.ljust(8, b"\0"), _done))
+            data = data[part.size:]
+        return requests
+
+
+def _cut(start: int, size: int) -> Callable[[bytes], bytes]:
+    return lambda data: _bytes(data)[start:start + size]

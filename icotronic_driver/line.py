@@ -1,0 +1,161 @@
+"""One request at a time on a CAN bus, while the frames of a stream keep coming."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TypeVar
+
+import can
+
+from driver_common.can_link import CanLink
+from driver_common.errors import FrameError, LinkError, NoAnswerError
+from icotronic_driver.commands import ACCELERATION_DATA, Request
+from icotronic_driver.identifier import SPU_1, Identifier, node_name, receiver_filter
+
+T = TypeVar("T")
+
+REPLY_TIMEOUT = 0.5  # s; behind the stationary unit there is a radio
+ATTEMPTS = 3  # a radio loses frames
+ERROR_BUS_OFF = 0x40  # in the identifier of an error frame of the kernel
+FILTERS = (receiver_filter(SPU_1), (SPU_1 << 6, 0x1F << 6))  # for us; and as if from us
+STREAM_ID = ACCELERATION_DATA.encode()
+
+StreamHandler = Callable[[bytearray, int], None]
+
+
+@dataclass
+class LineCounts:
+    """What was counted on the bus beside the stream.
+
+    Attributes:
+        stale: Frames for this host that answered nothing.
+        foreign: Frames of other protocols or for other nodes.
+        other_host: Frames of another host with our node number.
+        errors: Error frames of the controller.
+    """
+
+    stale: int = 0
+    foreign: int = 0
+    other_host: int = 0
+    errors: int = 0
+
+
+class Line:
+    """A CAN bus with a stationary unit, seen from the host.
+
+    Attributes:
+        counts: What was counted.
+        on_stream: Takes the data of each frame of the acceleration stream, and its arrival in ns
+            of host time.
+    """
+
+    def __init__(self, interface: str, channel: str, bitrate: int, options: Sequence[str]) -> None:
+        """Prepare the line; nothing is opened. For the arguments see `CanLink`."""
+        self.counts = LineCounts()
+        self.on_stream: StreamHandler | None = None
+        self._make_link = partial(CanLink, interface, channel, bitrate, options, FILTERS)
+        self._link: CanLink | None = None
+        self.name = f"{interface} {channel}"
+
+    def open(self) -> None:
+        """Open the bus; raises LinkError."""
+        self._link = self._make_link()
+
+    def close(self) -> None:
+        """Close the bus."""
+        if self._link is not None:
+            self._link.close()
+            self._link = None
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the bus is open."""
+        return self._link is not None
+
+    @property
+    def link(self) -> CanLink:
+        """The open bus; raises LinkError where it is closed."""
+        if self._link is None:
+            raise LinkError(f"{self.name} is not open")
+        return self._link
+
+    def listen(self, duration: float) -> None:
+        """Receive for some s and hand over what arrives; raises LinkError."""
+        link, handle = self.link, self.on_stream
+        receive, monotonic, now = link.receive, time.monotonic, time.time_ns
+        remaining, end = duration, monotonic() + duration
+        try:
+            while remaining > 0:
+                message = receive(remaining)
+                if message is None:
+                    return
+                if message.arbitration_id == STREAM_ID and handle and message.is_extended_id:
+                    handle(message.data, now())
+                else:
+                    self._count(message)
+                remaining = end - monotonic()
+        except (can.CanError, OSError) as error:
+            raise link.lost(error) from error
+
+    def request(self, request: Request[T], timeout: float = REPLY_TIMEOUT,
+                attempts: int = ATTEMPTS) -> T:
+        """Send a request, again where its answer is lost, and return what the answer says.
+
+        Raises:
+            RefusedError: The node answered with an error.
+            FrameError: The answer has a wrong length or content.
+            NoAnswerError: Nothing came in time.
+            LinkError: The bus failed.
+        """
+        for _ in range(attempts - 1):
+            with contextlib.suppress(NoAnswerError):
+                return self._attempt(request, timeout)
+        return self._attempt(request, timeout)
+
+    def _attempt(self, request: Request[T], timeout: float) -> T:
+        link = self.link
+        link.send(request.frame.identifier.encode(), request.frame.data)
+        end = time.monotonic() + timeout
+        try:
+            while (remaining := end - time.monotonic()) > 0:
+                message = link.receive(remaining)
+                if message is None:
+                    break
+                streamed = message.arbitration_id == STREAM_ID and message.is_extended_id
+                if streamed and self.on_stream:
+                    self.on_stream(message.data, time.time_ns())
+                if (message.is_extended_id and not message.is_error_frame
+                        and request.is_answered_by(message.arbitration_id, message.data)):
+                    return request.result(message.arbitration_id, message.data)
+                if not streamed:
+                    self._count(message)
+        except (can.CanError, OSError) as error:
+            raise link.lost(error) from error
+        raise NoAnswerError(f"{node_name(request.frame.identifier.receiver)} does not answer "
+                            f"on {self.name} ({request.name})")
+
+    def _count(self, message: can.Message) -> None:
+        """Count a frame that nobody waits for; raises LinkError where the controller gave up."""
+        if message.is_error_frame:
+            self.counts.errors += 1
+            if message.arbitration_id & ERROR_BUS_OFF:
+                raise LinkError(f"{self.name} is bus-off: check wiring, termination and bit rate; "
+                                "'ip link set … type can restart-ms 100' lets it recover")
+            return
+        try:
+            if not message.is_extended_id:
+                raise FrameError("a frame with a standard identifier")
+            identifier = Identifier.decode(message.arbitration_id)
+        except FrameError:
+            self.counts.foreign += 1
+            return
+        if identifier.sender == SPU_1:
+            self.counts.other_host += 1
+        elif identifier.receiver != SPU_1:
+            self.counts.foreign += 1
+        else:
+            self.counts.stale += 1

@@ -1,0 +1,361 @@
+"""ROS 2 node of the ICOtronic sensors: parameters, topics, services and diagnostics."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from sensor_msgs.msg import BatteryState, Imu, Temperature
+
+from driver_common import diagnostics
+from driver_common.device_node import DeviceNode, run
+from driver_common.errors import DriverError
+from driver_common.settings import Option
+from icotronic_driver.commands import CLOCK
+from icotronic_driver.eeprom import PAGE_NAMES, Field, FieldValue
+from icotronic_driver.identifier import STH_1, STU_1
+from icotronic_driver.line import Line
+from icotronic_driver.sensor import Channel, Options, Phase, Sensor, UnitIdentity
+from icotronic_driver.session import IcotronicBus, Listener
+from icotronic_driver.settings import SETTINGS
+from icotronic_driver.simulator import SimulatedIcotronic, simulated_network
+from icotronic_driver.streaming import AXES, LOAD_MAXIMUM
+from msg_conversions.battery import to_battery_state
+from msg_conversions.imu import UNKNOWN_VARIANCE, ImuTemplate
+from msg_conversions.temperature import to_temperature
+
+SIMULATED = "sim"
+CHANNELS = {channels: code for code, channels in enumerate(
+    ("x", "y", "z", "xy", "xz", "yz", "xyz"))}
+SIGNED_AXES = {sign + axis: code for code, (sign, axis) in enumerate(
+    (sign, axis) for sign in ("", "-") for axis in AXES)}
+QUEUE_TIME = 0.2  # s of samples that a publisher keeps for slow subscribers
+QUEUE_DEPTH = 2000  # enough for QUEUE_TIME at the default rate
+
+
+class IcotronicNode(DeviceNode, Listener):
+    """Driver of one ICOtronic sensor behind a stationary unit on CAN."""
+
+    SEVERAL_SENSORS = False
+    BUS_OPTIONS = (
+        Option("can_interface", kind=str, default="socketcan",
+               description="Interface of python-can, such as socketcan or socketcand; sim = a "
+                           "simulated sensor"),
+        Option("can_channel", kind=str, default="can0", description="Channel of the interface"),
+        Option("can_bitrate", kind=int, default=1_000_000, minimum=1, unit="bit/s",
+               description="Bit rate of the bus"),
+        Option("can_options", kind=list, default=[],
+               description='Further options of the interface, such as "host=127.0.0.1"'),
+    )
+    SENSOR_OPTIONS = (
+        Option("sensor_name", kind=str, default="", description="The sensor with this name"),
+        Option("sensor_mac", kind=str, default="",
+               description="The sensor with this MAC address, such as 08:6B:D7:01:DE:81"),
+        Option("sensor_number", kind=int, default=-1, minimum=-1, maximum=254,
+               description="The sensor with this number at the stationary unit; -1 = any"),
+        Option("frame_id", kind=str, default="imu_link", description="Frame of the measurements"),
+        Option("channels", kind=str, choices=CHANNELS, default="x", live=True,
+               description="Which channels are streamed; they share the rate of the ADC"),
+        *(Option(f"axis.{axis}", kind=str, choices=SIGNED_AXES, default=axis, live=True,
+                 description=f"Axis of the frame along which channel {axis} measures")
+          for axis in AXES),
+        Option("sample_rate", kind=float, default=0.0, minimum=0.0, maximum=CLOCK / 28, unit="Hz",
+               live=True, description="Samples per second of each channel; the nearest ADC "
+                                      "configuration is taken; 0 = as the adc parameters say"),
+        Option("calibration_source", kind=str, live=True, default="auto",
+               choices={"auto": 0, "device": 1, "range": 2},
+               description="Calibration from the device, or from acceleration_range_g; auto = the "
+                           "device's where it is plausible"),
+        Option("acceleration_range_g", kind=float, default=100.0, minimum=0.1, maximum=10000.0,
+               unit="g", live=True, description="The sensor measures ± this, for the calibration "
+                                                "by range"),
+        Option("linear_acceleration_stddev", kind=float, default=0.0, minimum=0.0, maximum=1e6,
+               unit="m/s²", live=True,
+               description="Standard deviation of the acceleration, for the covariance; 0 = "
+                           "unknown"),
+        Option("status_period", kind=float, default=8.0, minimum=0.5, maximum=3600.0, unit="s",
+               live=True, description="Time in which battery, temperature, RSSI, states and "
+                                      "counters are read once"),
+        Option("time_offset", kind=float, default=0.0, minimum=-10.0, maximum=10.0, unit="s",
+               live=True,
+               description="Added to every stamp; negative where the measurement was earlier"),
+    )
+    ALL_SETTINGS = SETTINGS
+
+    def __init__(self) -> None:
+        """Declare the parameters; raises SettingError."""
+        self._simulator: SimulatedIcotronic | None = None
+        self._topics: dict[str, Any] = {}
+        super().__init__("icotronic")
+
+    # --- set-up ---
+
+    def make_bus(self) -> IcotronicBus:
+        """Return the bus, with a simulator behind it where that was asked for."""
+        interface, channel = self.option("can_interface"), self.option("can_channel")
+        options: list[str] = self.option("can_options")
+        if interface == SIMULATED:
+            self._simulator = simulated_network().start()
+            interface = "socketcand"
+            options = [f"host={self._simulator.host}", f"port={self._simulator.port}"]
+        sensor = Options(
+            sensor_name=self.option("sensor_name"), sensor_mac=self.option("sensor_mac"),
+            sensor_number=self.option("sensor_number"),
+            wanted=self.wanted_settings(""), config_mode=self.option("config_mode"))
+        self._set_live(sensor)
+        return IcotronicBus(Line(interface, channel, self.option("can_bitrate"), options),
+                            sensor, self)
+
+    def release(self) -> None:
+        """End the simulator."""
+        if self._simulator is not None:
+            self._simulator.close()
+            self._simulator = None
+
+    def _set_live(self, options: Options) -> None:
+        """Hand over the options that may change at run time."""
+        options.channels = self.option("channels")
+        options.sample_rate = self.option("sample_rate")
+        options.calibration_source = self.option("calibration_source")
+        options.acceleration_range = self.option("acceleration_range_g")
+        options.status_period = self.option("status_period")
+
+    def apply_options(self) -> None:
+        """Hand live options to the bus; the stream begins anew with them."""
+        if self.bus is not None and self.thread is not None:
+            self._set_live(self.bus.sensor.options)
+            self.thread.post(self.bus.restart_stream)
+
+    def make_interfaces(self, sensor: str) -> None:
+        """Create topics and services."""
+        self._topics = {
+            "imu": self.add_publisher(Imu, sensor, "imu/data_raw", depth=QUEUE_DEPTH),
+            "battery_voltage": self.add_publisher(BatteryState, sensor, "battery"),
+            "temperature": self.add_publisher(Temperature, sensor, "temperature")}
+        for name, action in (
+                ("start_acquisition", lambda: self._enable(True)),
+                ("stop_acquisition", lambda: self._enable(False)),
+                ("scan", self._scan),
+                ("reconnect", self._reconnect),
+                ("reset_sth", lambda: self._reset(STH_1)),
+                ("reset_stu", lambda: self._reset(STU_1)),
+                ("read_eeprom", lambda: self._read_eeprom(STH_1)),
+                ("read_stu_eeprom", lambda: self._read_eeprom(STU_1)),
+                ("measure_calibration", self._measure),
+                ("preview_save", self._preview_save),
+                ("save_all_settings", self._save)):
+            self.add_trigger(sensor, name, action)
+
+    # --- what the bus reports, in its thread ---
+
+    def on_found(self, sensor: Sensor) -> None:
+        """Show the sensor's settings as parameters."""
+        assert sensor.identity is not None
+        self.get_logger().info(
+            f'connected to "{sensor.identity.name}" ({sensor.identity.mac}), firmware '
+            f"{sensor.identity.firmware}; channel{'s' * (len(sensor.channels) > 1)} "
+            f"{', '.join(f'{one.name} calibrated by {one.source}' for one in sensor.channels)}; "
+            f"{sensor.sample_rate:.6g} samples per second")
+        warning = sensor.load_warning(self.option("can_bitrate"))
+        if warning:
+            self.get_logger().warning(warning)
+        self.show_settings("", sensor)
+
+    def on_values(self, sensor: Sensor) -> None:
+        """Show the values that were read again."""
+        self.show_settings("", sensor)
+
+    def on_lost(self, sensor: Sensor, error: DriverError) -> None:
+        """Log why there is no sensor."""
+        self.get_logger().error(f"{error} (waiting for it)")
+
+    def on_note(self, text: str, *, warning: bool = False) -> None:
+        """Log a line."""
+        (self.get_logger().warning if warning else self.get_logger().info)(text)
+
+    def on_stream(self, sensor: Sensor) -> Callable[[int, float, tuple[int, ...]], None]:
+        """Return what publishes the samples of a stream that begins: the hot path."""
+        axes = [SIGNED_AXES[self.option(f"axis.{channel.name}")] for channel in sensor.channels]
+        if len({axis % 3 for axis in axes}) < len(axes):
+            self.get_logger().error("two channels are mapped to the same axis; correct the "
+                                    "parameters axis.x, axis.y and axis.z")
+        variances = [UNKNOWN_VARIANCE] * 3
+        for axis in axes:
+            variances[axis % 3] = self.option("linear_acceleration_stddev") ** 2
+        template = ImuTemplate(variances, self.option("frame_id"))
+        offset = round(self.option("time_offset") * 1e9)
+        places = [_place(channel, axis) for channel, axis in zip(sensor.channels, axes,
+                                                                 strict=True)]
+        make = _one_channel if len(places) == 1 else _several_channels
+        return self.while_running(
+            make(template.serialised, self._topics["imu"].publish, places, offset))
+
+    def on_readings(self, sensor: Sensor, name: str) -> None:
+        """Publish a reading that has a topic."""
+        value = getattr(sensor.readings, name)
+        convert = {"battery_voltage": to_battery_state, "temperature": to_temperature}.get(name)
+        if convert is not None:
+            self.while_running(self._topics[name].publish)(
+                convert(value, self.option("frame_id"), time.time_ns()))
+
+    # --- services, in the executor ---
+
+    def _enable(self, enabled: bool) -> str:
+        self.call(lambda: self.bus.set_enabled(self.bus.sensor, enabled))
+        return f"acquisition {'started' if enabled else 'stopped'}"
+
+    def _scan(self) -> str:
+        seen = self.call(self.bus.scan)
+        note = ("; a connected sensor hides the others"
+                if self.bus.sensor.phase is not Phase.SEARCHING else "")
+        return f"{len(seen)} in range: {'; '.join(map(str, seen)) or 'none'}{note}"
+
+    def _reconnect(self) -> str:
+        self.call(self.bus.reconnect)
+        return "disconnected; searching again"
+
+    def _reset(self, node: int) -> str:
+        self.call(lambda: self.bus.reset(node))
+        return "reset; the sensor will be connected again"
+
+    def _read_eeprom(self, node: int) -> str:
+        fields = self.call(lambda: self.bus.read_eeprom(node))
+        lines = []
+        for page, name in PAGE_NAMES.items():
+            content = [f"  {field.name}: {field.text(value)}"
+                       for field, value in fields.items() if field.page == page]
+            if content:
+                lines += [f"{name} (page {page})", *content]
+        return "\n".join(lines)
+
+    def _measure(self) -> str:
+        results = self.call(self.bus.measure)
+        return "; ".join(f"{name}: {value:g}" for name, value in results.items())
+
+    def _preview_save(self) -> str:
+        return f"saving would change {_changes(self.call(self.bus.unsaved))}"
+
+    def _save(self) -> str:
+        return f"saved {_changes(self.call(self.bus.save))} in the sensor's EEPROM"
+
+    # --- diagnostics ---
+
+    def status_of(self, sensor: Sensor) -> DiagnosticStatus:
+        """Return identity, link, rate, losses, calibration, readings and differing settings."""
+        counts, line = sensor.statistics, self.bus.line
+        values: dict[str, object] = {"bus": line.name, "phase": sensor.phase.value}
+        for title, identity in (("sensor", sensor.identity), ("stationary unit",
+                                                              sensor.stu_identity)):
+            if identity is not None:
+                values |= _identity(title, identity)
+        if sensor.phase is Phase.CONNECTED:
+            load = sensor.bus_load(self.option("can_bitrate"))
+            values |= {"sample rate [Hz]": sensor.sample_rate,
+                       "measured sample rate [Hz]": sensor.measured_rate,
+                       "bus load [%]": 100 * load}
+            values |= {f"calibration of channel {channel.name}":
+                       f"{channel.slope:.6g} m/s² per step, offset {channel.offset:.6g} m/s², by "
+                       f"{channel.source}" for channel in sensor.channels}
+        values |= {name.replace("_", " "): value for name, value in vars(sensor.readings).items()
+                   if value is not None}
+        values |= {
+            "frames": counts.frames, "lost frames": counts.lost,
+            "duplicate frames": counts.duplicates, "damaged frames": counts.damaged,
+            "fault of the last damaged frame": counts.fault,
+            "stale frames": line.counts.stale, "foreign frames": line.counts.foreign,
+            "frames of another host": line.counts.other_host, "error frames": line.counts.errors,
+            "connections": sensor.connections, "time-outs": sensor.time_outs,
+            "unsaved settings": ", ".join(sorted(sensor.unsaved))}
+        values |= {f"{name} differs": f"wanted {wanted}, reported {reported}"
+                   for name, (wanted, reported) in sensor.differing.items()}
+        hardware_id = (f"{sensor.identity.name} {sensor.identity.mac}" if sensor.identity else "")
+        return diagnostics.to_status(f"{self.get_name()}: sensor", hardware_id,
+                                     *self._health(sensor), values)
+
+    def _health(self, sensor: Sensor) -> tuple[bytes, str]:
+        """Return level and message of the diagnostics."""
+        if sensor.phase is not Phase.CONNECTED:
+            return diagnostics.ERROR, str(sensor.error or sensor.phase.value)
+        bitrate = self.option("can_bitrate")
+        load = sensor.load_warning(bitrate)
+        if load:
+            return (diagnostics.ERROR if sensor.bus_load(bitrate) > LOAD_MAXIMUM
+                    else diagnostics.WARN), load
+        if self.bus.line.counts.other_host:
+            return diagnostics.WARN, ("another host on the bus uses our node number (SPU 1); end "
+                                      "one of the two")
+        if sensor.differing:
+            return diagnostics.WARN, f"{len(sensor.differing)} settings are not as wanted"
+        if sensor.decoder is None:
+            return diagnostics.OK, "connected, acquisition stopped"
+        counts = sensor.statistics
+        message = f"{sensor.measured_rate:.6g} samples per second, {counts.lost} frames lost"
+        if counts.lost > 0.01 * counts.frames:
+            return diagnostics.WARN, message
+        return diagnostics.OK, message
+
+
+def _place(channel: Channel, axis: int) -> tuple[int, float, float]:
+    """Return axis, slope and offset of a channel in the frame of the message."""
+    sign = -1.0 if axis >= 3 else 1.0
+    return axis % 3, sign * channel.slope, sign * channel.offset
+
+
+Serialise = Callable[..., bytes]
+Publish = Callable[[bytes], None]
+
+
+def _one_channel(serialise: Serialise, publish: Publish, places: Sequence[tuple[int, float, float]],
+                 stamp_offset: int) -> Callable[[int, float, tuple[int, ...]], None]:
+    """Return what publishes the samples of one channel."""
+    axis, slope, offset = places[0]
+    before, behind = (0.0,) * axis, (0.0,) * (2 - axis)
+    last = 0
+
+    def publish_samples(stamp: int, period: float, values: tuple[int, ...]) -> None:
+        nonlocal last
+        stamp += stamp_offset
+        for index, raw in enumerate(values):
+            last = max(last + 1, stamp + int(index * period))  # stamps never go backwards
+            publish(serialise(last, *before, slope * raw + offset, *behind))
+
+    return publish_samples
+
+
+def _several_channels(serialise: Serialise, publish: Publish,
+                      places: Sequence[tuple[int, float, float]],
+                      stamp_offset: int) -> Callable[[int, float, tuple[int, ...]], None]:
+    """Return what publishes the samples of several channels."""
+    count, last = len(places), 0
+    acceleration = [0.0, 0.0, 0.0]
+
+    def publish_samples(stamp: int, period: float, values: tuple[int, ...]) -> None:
+        nonlocal last
+        stamp += stamp_offset
+        for index in range(0, len(values), count):
+            for (axis, slope, offset), raw in zip(places, values[index:index + count],
+                                                  strict=True):
+                acceleration[axis] = slope * raw + offset
+            last = max(last + 1, stamp + int(index // count * period))
+            x, y, z = acceleration
+            publish(serialise(last, x, y, z))
+
+    return publish_samples
+
+
+def _identity(title: str, identity: UnitIdentity) -> dict[str, object]:
+    return {f"{title}: {name.replace('_', ' ')}": value for name, value in vars(identity).items()
+            if value not in (None, "")}
+
+
+def _changes(changes: Mapping[Field, tuple[FieldValue, FieldValue]]) -> str:
+    return "; ".join(f"{field.name}: {field.text(stored)} → {field.text(new)}"
+                     for field, (stored, new) in changes.items()) or "nothing"
+
+
+def main(args: Sequence[str] | None = None) -> None:
+    """Run the node."""
+    sys.exit(run(IcotronicNode, args))

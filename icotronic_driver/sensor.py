@@ -1,0 +1,253 @@
+"""The sensor behind the stationary unit: how it is to be used, what is known, what was counted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import NamedTuple
+
+from driver_common.device import Device, DeviceOptions
+from driver_common.sample_clock import SampleClock
+from icotronic_driver.commands import (
+    AdcConfiguration,
+    ErrorStatus,
+    NodeStatus,
+    OperatingTime,
+    PowerCycles,
+    Version,
+)
+from icotronic_driver.streaming import (
+    AXES,
+    LOAD_LIMIT,
+    LOAD_MAXIMUM,
+    STANDARD_GRAVITY,
+    Calibration,
+    StreamDecoder,
+    StreamFormat,
+    StreamStatistics,
+    stream_format,
+)
+
+NO_CALIBRATION = Calibration(0.0, 0.0)
+
+
+class Phase(Enum):
+    """Where the sensor is on its way to a stream."""
+
+    SEARCHING = "searching"
+    CONNECTING = "connecting"
+    CONNECTED = "connected"
+
+
+class SeenSensor(NamedTuple):
+    """A sensor in range of the stationary unit."""
+
+    number: int
+    name: str
+    mac: str
+    rssi: int  # dBm
+
+    def __str__(self) -> str:
+        """Return all of it for people."""
+        return f'"{self.name}" ({self.mac}, number {self.number}, {self.rssi} dBm)'
+
+
+@dataclass
+class Options(DeviceOptions):
+    """How the sensor is to be used.
+
+    Attributes:
+        sensor_name: The sensor with this name, "" = any.
+        sensor_mac: The sensor with this MAC address, "" = any.
+        sensor_number: The sensor with this number, -1 = any.
+        channels: Which channels are streamed.
+        sample_rate: Wanted values/s of each channel; 0 = as the ADC settings say.
+        calibration_source: "device", "range", or "auto" = device where that is plausible.
+        acceleration_range: The sensor measures ± this many g, for the calibration by range.
+        status_period: Time in s in which battery, temperature, RSSI and counters are read once.
+    """
+
+    sensor_name: str = ""
+    sensor_mac: str = ""
+    sensor_number: int = -1
+    channels: str = "x"
+    sample_rate: float = 0.0
+    calibration_source: str = "auto"
+    acceleration_range: float = 100.0
+    status_period: float = 8.0
+
+
+@dataclass(frozen=True)
+class UnitIdentity:
+    """Product data of a sensor or a stationary unit; None where it does not tell."""
+
+    name: str
+    mac: str
+    gtin: int | None
+    hardware: Version | None
+    firmware: Version | None
+    release: str | None
+    serial_number: str | None
+    production_date: str | None
+
+
+@dataclass
+class Readings:
+    """What is read now and then; None while it is not known."""
+
+    rssi: int | None = None
+    battery_voltage: float | None = None
+    temperature: float | None = None
+    sth_status: NodeStatus | None = None
+    stu_status: NodeStatus | None = None
+    sth_errors: ErrorStatus | None = None
+    stu_errors: ErrorStatus | None = None
+    power_cycles: PowerCycles | None = None
+    operating_time: OperatingTime | None = None
+    under_voltages: int | None = None
+    watchdog_resets: int | None = None
+
+
+class Channel(NamedTuple):
+    """A streamed channel: acceleration in m/s² = slope · raw + offset."""
+
+    name: str
+    slope: float
+    offset: float
+    source: str  # of the calibration
+
+
+class Sensor(Device):
+    """The sensor behind the stationary unit.
+
+    Attributes:
+        options: How it is to be used.
+        phase: Where it is on its way to a stream.
+        target: The sensor that is connected, or being connected.
+        seen: The sensors in range when it was last looked.
+        identity: Who it is; None while it is not connected.
+        stu_identity: Who the stationary unit is.
+        readings: What is read now and then.
+        channels: The streamed channels.
+        decoder: Decodes the stream; None while there is none.
+        clock: Gives the samples of the stream their times.
+        totals: Statistics of the streams before the present one.
+        enabled: Whether the stream is wanted, as far as the user of the services says.
+        connections: How often it was connected.
+    """
+
+    def __init__(self, options: Options) -> None:
+        """Begin as an unknown sensor."""
+        super().__init__(options)
+        self.options = options
+        self.phase = Phase.SEARCHING
+        self.target: SeenSensor | None = None
+        self.seen: list[SeenSensor] = []
+        self.identity: UnitIdentity | None = None
+        self.stu_identity: UnitIdentity | None = None
+        self.readings = Readings()
+        self.channels: list[Channel] = []
+        self.eeprom_calibrations: dict[str, Calibration] = {}
+        self.decoder: StreamDecoder | None = None
+        self.clock = SampleClock(1.0)
+        self.totals = StreamStatistics()
+        self.enabled = True
+        self.connections = 0
+        self.time_outs = 0
+
+    @property
+    def product(self) -> str:
+        """Name of what is connected."""
+        return "ICOtronic sensor"
+
+    @property
+    def adc(self) -> AdcConfiguration:
+        """The ADC configuration that the sensor reported."""
+        values = self.values
+        default = AdcConfiguration()
+        return AdcConfiguration(
+            int(values.get("adc.prescaler", default.prescaler)),  # type: ignore[arg-type]
+            int(values.get("adc.acquisition_time",  # type: ignore[arg-type]
+                           default.acquisition_time)),
+            int(values.get("adc.oversampling_rate",  # type: ignore[arg-type]
+                           default.oversampling_rate)),
+            float(values.get("adc.reference_voltage",  # type: ignore[arg-type]
+                             default.reference_voltage)))
+
+    @property
+    def format(self) -> StreamFormat:
+        """The format in which the wanted channels are streamed."""
+        x, y, z = (axis in self.options.channels for axis in AXES)
+        return stream_format((x, y, z))
+
+    @property
+    def sample_rate(self) -> float:
+        """Samples/s of each channel that the ADC settings give (errata C7)."""
+        return self.adc.sample_rate / self.format.channel_count
+
+    @property
+    def measured_rate(self) -> float:
+        """Samples/s of each channel on the host's clock, 0 while there is no stream."""
+        return 1e9 / self.clock.period if self.decoder is not None else 0.0
+
+    def bus_load(self, bitrate: float) -> float:
+        """Return the share of the bus that the stream takes (section 9.2.10)."""
+        return self.format.bus_load(self.adc.sample_rate, bitrate)
+
+    def load_warning(self, bitrate: float) -> str:
+        """Return what is to be said about the bus load, "" where it is fine."""
+        load = self.bus_load(bitrate)
+        if load <= LOAD_LIMIT:
+            return ""
+        limit = LOAD_MAXIMUM if load > LOAD_MAXIMUM else LOAD_LIMIT
+        return f"the stream takes {load:.0%} of the bus, more than {limit:.0%}"
+
+    @property
+    def statistics(self) -> StreamStatistics:
+        """What was counted of all streams since the start."""
+        now = self.decoder.statistics if self.decoder is not None else StreamStatistics()
+        then = self.totals
+        return StreamStatistics(
+            then.frames + now.frames, then.lost + now.lost, then.duplicates + now.duplicates,
+            then.damaged + now.damaged, then.others + now.others, now.fault or then.fault)
+
+    def end_stream(self) -> None:
+        """Keep the statistics of the stream that ended."""
+        self.totals = self.statistics
+        self.decoder = None
+
+    def choose_calibrations(self) -> list[str]:
+        """Take the calibration of each streamed channel; return what is wrong (errata C9)."""
+        complaints = []
+        self.channels = []
+        for axis in self.options.channels:
+            calibration, source, complaint = self._calibration(axis)
+            self.channels.append(Channel(axis, calibration.slope * STANDARD_GRAVITY,
+                                         calibration.offset * STANDARD_GRAVITY, source))
+            if complaint:
+                complaints.append(f"channel {axis}: {complaint}; using {source}")
+        return complaints
+
+    def _calibration(self, axis: str) -> tuple[Calibration, str, str]:
+        """Return calibration, its source and what is wrong with the device's own."""
+        by_range = Calibration.of_range(self.options.acceleration_range)
+        range_text = f"the range of ±{self.options.acceleration_range:g} g"
+        if self.options.calibration_source == "range":
+            return by_range, range_text, ""
+        faults = []
+        for source, calibration in self._device_calibrations(axis):
+            if not calibration.fault:
+                return calibration, source, ""
+            faults.append(f"{source}: {calibration.fault}")
+        complaint = "no plausible calibration (" + "; ".join(faults or ["none stored"]) + ")"
+        return by_range, range_text, complaint
+
+    def _device_calibrations(self, axis: str) -> list[tuple[str, Calibration]]:
+        found = []
+        slope, offset = (self.values.get(f"calibration.acceleration_{axis}.{part}")
+                         for part in ("slope", "offset"))
+        if isinstance(slope, float) and isinstance(offset, float):
+            found.append(("the device's factors", Calibration(slope, offset)))
+        if axis in self.eeprom_calibrations:
+            found.append(("the device's EEPROM", self.eeprom_calibrations[axis]))
+        return found

@@ -1,0 +1,638 @@
+"""The conversation with a sensor behind a stationary unit: find, connect, configure, stream.
+
+The stationary unit (STU) sits on the bus, the sensor (STH) behind its radio. All of `IcotronicBus`
+runs in one thread (see `driver_common.device_thread`).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import re
+import time
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, TypeVar
+
+from driver_common.errors import (
+    DriverError,
+    FrameError,
+    LinkError,
+    NoAnswerError,
+    RefusedError,
+    SettingError,
+    WrongDeviceError,
+)
+from driver_common.sample_clock import SampleClock
+from driver_common.settings import Raw, Record, Value
+from icotronic_driver import commands, eeprom
+from icotronic_driver.commands import (
+    SELF,
+    CalibrationElement,
+    Command,
+    IcotronicRecord,
+    Request,
+    decode_name,
+)
+from icotronic_driver.eeprom import STH_EEPROM, STU_EEPROM, Field, FieldValue, Status
+from icotronic_driver.identifier import STH_1, STU_1
+from icotronic_driver.line import Line
+from icotronic_driver.sensor import Options, Phase, Readings, SeenSensor, Sensor, UnitIdentity
+from icotronic_driver.settings import SETTINGS, nearest_adc_configuration
+from icotronic_driver.streaming import Calibration, StreamDecoder, supply_voltage
+
+T = TypeVar("T")
+
+LISTEN_TIME = 0.05  # s that jobs of others wait at most
+CONNECT_RETRY = 3.0  # s until the connect is asked for again (errata C4)
+CONNECT_TIMEOUT = 12.0  # s until another search
+CONNECT_POLL = 0.1  # s
+SETTLE_TIME = 0.6  # s in which the same sensors must be in range before one is taken
+PATIENCE = 3.0  # s until a sensor that only advertises now and then must have been seen
+KEEP_ALIVE = 1.0  # s between checks of a connection without a stream
+SILENCE = 1.0  # s without a frame after which the stream is looked after
+DISCONNECT_TIMEOUT = 0.3  # s
+
+
+class Listener:
+    """What a user of the bus wants to hear; all called in the thread of the bus."""
+
+    def on_found(self, sensor: Sensor) -> None:
+        """Tell that the sensor was connected and configured."""
+
+    def on_values(self, sensor: Sensor) -> None:
+        """Tell that values of settings were read again."""
+
+    def on_lost(self, sensor: Sensor, error: DriverError) -> None:
+        """Tell that the sensor is not there (any more), once per change of the reason."""
+
+    def on_note(self, text: str, *, warning: bool = False) -> None:
+        """Tell something worth a line in the log."""
+
+    def on_stream(self, sensor: Sensor) -> Callable[[int, float, tuple[int, ...]], None]:
+        """Return what takes the samples of a stream that begins.
+
+        It is called for each data frame with the time of the first sample in ns, the time between
+        two samples in ns, and the raw values, oldest first.
+        """
+        raise NotImplementedError
+
+    def on_readings(self, sensor: Sensor, name: str) -> None:
+        """Tell that one of the sensor's readings is new."""
+
+
+class IcotronicBus:
+    """A stationary unit on a CAN bus, and one sensor behind it.
+
+    Attributes:
+        devices: The sensor.
+        line: The CAN bus.
+        link_error: Why the bus is not open.
+    """
+
+    def __init__(self, line: Line, options: Options, listener: Listener) -> None:
+        """Prepare the bus; nothing is opened."""
+        self.line = line
+        self.sensor = Sensor(options)
+        self.devices = [self.sensor]
+        self.link_error: LinkError | None = None
+        self._listener = listener
+        self._active = False
+        self._connect_until = self._connect_again = 0.0
+        self._settled_since = 0.0
+        self._searching_since = 0.0
+        self._last_frame = 0.0
+        self._restarts = 0
+        self._next_reading = 0.0
+        self._readings = itertools.cycle(_READINGS)
+
+    # --- what the thread of the bus calls ---
+
+    def open(self) -> None:
+        """Open the CAN bus; raises LinkError."""
+        try:
+            self.line.open()
+        except LinkError as error:
+            self.link_error = error
+            raise
+        self.link_error = None
+        self.sensor.due = 0.0
+        self.sensor.backoff.reset()
+        self._searching_since = time.monotonic()
+
+    def poll(self) -> float:
+        """Do the next step; return the time in s until the one after."""
+        step = {Phase.SEARCHING: self._search, Phase.CONNECTING: self._await_connection,
+                Phase.CONNECTED: self._serve}[self.sensor.phase]
+        try:
+            if self.sensor.due <= time.monotonic():
+                step()
+        except LinkError as error:
+            self.link_error = error
+            raise
+        except DriverError as error:
+            self._lose(error)
+        return max(0.0, self.sensor.due - time.monotonic())
+
+    def close(self) -> None:
+        """Leave the sensor stopped and disconnected, and close the bus."""
+        if self.line.is_open:
+            with contextlib.suppress(DriverError):
+                self._disconnect()
+        self._forget()
+        self.line.close()
+
+    # --- what a user calls, through the thread ---
+
+    def set_active(self, active: bool) -> None:
+        """Start or stop the stream, now and after every reconnection."""
+        self._active = active
+        self._start_or_stop()
+
+    def set_enabled(self, sensor: Sensor, enabled: bool) -> None:
+        """Start or stop the stream; raises DriverError."""
+        self._require()
+        if enabled and not self._active:
+            raise SettingError("the node is not active, so nothing would be published; "
+                               "activate it first")
+        sensor.enabled = enabled
+        self._start_or_stop()
+
+    def write(self, sensor: Sensor, changes: Mapping[str, Value]) -> dict[str, Value]:
+        """Write settings, all or none, and return what the sensor reports; raises DriverError."""
+        self._require()
+        with self._stopped_for(changes):
+            reported = sensor.write(_Access(self.line), changes)
+            if any(name.startswith("calibration.") for name in changes):
+                self._choose_calibrations()
+        if "name" in changes and sensor.options.sensor_name:
+            sensor.options.sensor_name = str(reported["name"])
+        return reported
+
+    def restart_stream(self) -> None:
+        """Begin the stream anew, after a change of channels, calibration or rate."""
+        if self.sensor.phase is Phase.CONNECTED:
+            self._stop()
+            self._apply_sample_rate()
+            self.sensor.make_as_wanted(self._write_wanted, self._listener.on_note)
+            self._choose_calibrations()
+            self._start_or_stop()
+            self._listener.on_values(self.sensor)
+
+    def scan(self) -> list[SeenSensor]:
+        """Return the sensors in range; a connected one hides the others."""
+        if self.sensor.phase is Phase.SEARCHING:
+            self._look_around()
+        elif self.sensor.target is not None:
+            return [self.sensor.target]
+        return self.sensor.seen
+
+    def reconnect(self) -> None:
+        """Disconnect, and search again."""
+        self._disconnect()
+        self._lose(NoAnswerError("reconnecting, as asked for"))
+        self.sensor.due = 0.0
+
+    def reset(self, node: int) -> None:
+        """Reset the sensor or the stationary unit; the connection comes back by itself."""
+        if node == STH_1:
+            self._require()
+        self.line.request(commands.RESET.request(node))
+        self._lose(NoAnswerError("reset, as asked for"))
+
+    def execute(self, request: Request[T]) -> T:
+        """Carry out any request; raises DriverError."""
+        if request.frame.identifier.receiver == STH_1:
+            self._require()
+        return self.line.request(request)
+
+    def measure(self) -> dict[str, float]:
+        """Make a calibration measurement of everything; return the results by name."""
+        self._require()
+        results: dict[str, float] = {}
+        for element, dimension in _MEASUREMENTS:
+            name = f"{element.name.lower()} {dimension}"
+            with contextlib.suppress(RefusedError):
+                results[name] = self.line.request(
+                    commands.MEASURE.request(STH_1, element, dimension))
+        with contextlib.suppress(RefusedError):
+            results["temperature [°C]"] = self.line.request(
+                commands.READ_TEMPERATURE.request(STH_1))
+        return results
+
+    def read_eeprom(self, node: int) -> dict[Field, FieldValue]:
+        """Return all fields of the EEPROM of the sensor or the stationary unit."""
+        if node == STH_1:
+            self._require()
+        fields = STH_EEPROM if node == STH_1 else STU_EEPROM
+        return {field: self._read_field(node, field) for field in fields.values()}
+
+    def unsaved(self) -> dict[Field, tuple[FieldValue, FieldValue]]:
+        """Return the EEPROM fields that a save would change: (stored, new)."""
+        self._require()
+        changes: dict[Field, tuple[FieldValue, FieldValue]] = {}
+        for name, field in _STORED.items():
+            if name in self.sensor.values:
+                new = self.sensor.values[name]
+                assert isinstance(new, (int, float, str))
+                stored = self._read_field(STH_1, field)
+                if field.encode(new) != _raw(field, stored):
+                    changes[field] = (stored, new)
+        return changes
+
+    def save(self) -> dict[Field, tuple[FieldValue, FieldValue]]:
+        """Write what differs into the EEPROM, read it back, and return what was changed."""
+        changes = self.unsaved()
+        for field, (_, new) in changes.items():
+            self._write_field(field, new)
+            stored = self._read_field(STH_1, field)
+            if _raw(field, stored) != field.encode(new):
+                raise RefusedError(f"the EEPROM took {field.name} = {field.text(new)} but holds "
+                                   f"{field.text(stored)}; it may be locked")
+        self.sensor.unsaved -= set(_STORED)
+        return changes
+
+    # --- searching and connecting (errata C4) ---
+
+    def _search(self) -> None:
+        """Look for the wanted sensor, and ask the stationary unit to connect it."""
+        self._look_around()
+        target = self._choose()
+        if target is None:
+            return
+        self.sensor.target = target
+        self.sensor.phase = Phase.CONNECTING
+        self._connect_until = time.monotonic() + CONNECT_TIMEOUT
+        self._connect_again = 0.0
+
+    def _look_around(self) -> None:
+        """Ask the stationary unit which sensors are in range."""
+        self.line.request(commands.ACTIVATE_BLUETOOTH.request(STU_1))
+        seen = []
+        for number in range(self.line.request(commands.COUNT_DEVICES.request(STU_1))):
+            name = decode_name(*(self.line.request(part.request(STU_1, number))
+                                 for part in (commands.READ_NAME_1, commands.READ_NAME_2)))
+            mac = self.line.request(commands.READ_MAC.request(STU_1, number))
+            rssi = self.line.request(commands.READ_RSSI.request(STU_1, number))
+            seen.append(SeenSensor(number, name, mac, rssi))
+        if [one.mac for one in seen] != [one.mac for one in self.sensor.seen]:
+            self._settled_since = time.monotonic()
+        self.sensor.seen = seen
+
+    def _choose(self) -> SeenSensor | None:
+        """Return the wanted sensor; None where more may still come into range.
+
+        Raises:
+            NoAnswerError: The wanted sensor is not in range.
+            WrongDeviceError: Several are in range, and none was named.
+        """
+        options, seen = self.sensor.options, self.sensor.seen
+        wanted = [one for one in seen
+                  if (not options.sensor_name or one.name == options.sensor_name)
+                  and (not options.sensor_mac or one.mac == options.sensor_mac.upper())
+                  and options.sensor_number in (-1, one.number)]
+        named = options.sensor_name or options.sensor_mac or options.sensor_number >= 0
+        now = time.monotonic()
+        if ((not wanted and now - self._searching_since < PATIENCE)
+                or (wanted and not named and now - self._settled_since < SETTLE_TIME)):
+            self.sensor.due = now + CONNECT_POLL
+            return None
+        if not wanted:
+            in_range = "; ".join(map(str, seen)) or "none"
+            raise NoAnswerError(
+                f"the sensor{_described(options)} is not in range of the stationary unit (in "
+                f"range: {in_range}); wake it up, bring it nearer or correct the parameter"
+                if named else "no sensor is in range of the stationary unit; wake it up or bring "
+                              "it nearer")
+        if len(wanted) > 1:
+            raise WrongDeviceError(
+                f"{len(wanted)} sensors are in range: {'; '.join(map(str, wanted))}; say which one "
+                "with the parameter sensor_name or sensor_mac")
+        return wanted[0]
+
+    def _await_connection(self) -> None:
+        """Ask for the connection, again every few seconds, until it is there."""
+        assert self.sensor.target is not None
+        now = time.monotonic()
+        if self._connect_again and self.line.request(commands.CHECK_CONNECTED.request(STU_1)):
+            self._greet()
+        elif now > self._connect_until:
+            raise NoAnswerError(f"the sensor {self.sensor.target} does not connect; bring it "
+                                "nearer, or check its battery")
+        else:
+            if now >= self._connect_again:
+                self.line.request(commands.CONNECT_MAC.request(STU_1, self.sensor.target.mac))
+                self._connect_again = now + CONNECT_RETRY
+            self.sensor.due = now + CONNECT_POLL
+
+    def _greet(self) -> None:
+        """Identify and configure the sensor that was connected."""
+        sensor = self.sensor
+        sensor.stu_identity = self._identify(STU_1)
+        sensor.identity = self._identify(STH_1)
+        sensor.readings = Readings()
+        self._check_eeprom()
+        sensor.read_all(_Access(self.line), SETTINGS, self._listener.on_note)
+        sensor.eeprom_calibrations = self._eeprom_calibrations()
+        sensor.phase = Phase.CONNECTED
+        self._apply_sample_rate()
+        sensor.make_as_wanted(self._write_wanted, self._listener.on_note)
+        self._choose_calibrations()
+        sensor.error = None
+        sensor.backoff.reset()
+        sensor.connections += 1
+        self._listener.on_found(sensor)
+        self._start_or_stop()
+
+    def _identify(self, node: int) -> UnitIdentity:
+        def ask(command: Command[[], T]) -> T | None:
+            with contextlib.suppress(RefusedError, FrameError):
+                return self.line.request(command.request(node))
+            return None
+
+        name = decode_name(*(self.line.request(part.request(node, SELF))
+                             for part in (commands.READ_NAME_1, commands.READ_NAME_2)))
+        serial = [ask(part) for part in commands.READ_SERIAL_NUMBER]
+        return UnitIdentity(
+            name, self.line.request(commands.READ_MAC.request(node, SELF)),
+            ask(commands.READ_GTIN), ask(commands.READ_HARDWARE_VERSION),
+            ask(commands.READ_FIRMWARE_VERSION), ask(commands.READ_RELEASE_NAME),
+            commands.decode_text(b"".join(part or b"" for part in serial)),
+            ask(commands.READ_PRODUCTION_DATE))
+
+    def _check_eeprom(self) -> None:
+        """Say when the sensor's EEPROM will not keep what it holds (section 8.3.1.1.1)."""
+        byte = self._read_field(STH_1, STH_EEPROM["EEPROM Status"])
+        assert isinstance(byte, int)
+        if Status.of(byte) is Status.UNINITIALIZED:
+            self._listener.on_note(f"the sensor's EEPROM is not initialised (0x{byte:02X}): at its "
+                                   "next reset it takes default values", warning=True)
+
+    def _eeprom_calibrations(self) -> dict[str, Calibration]:
+        calibrations = {}
+        for axis in self.sensor.options.channels:
+            pair = [self._read_field(STH_1, STH_EEPROM[f"Acceleration {axis.upper()}: {part}"])
+                    for part in ("Slope", "Offset")]
+            calibrations[axis] = Calibration(*map(float, pair))
+        return calibrations
+
+    def _apply_sample_rate(self) -> None:
+        """Turn the wanted sample rate into settings of the ADC."""
+        sensor = self.sensor
+        if sensor.options.sample_rate:
+            total = sensor.options.sample_rate * sensor.format.channel_count
+            adc = nearest_adc_configuration(total, sensor.adc.reference_voltage)
+            sensor.options.wanted |= {
+                "adc.prescaler": adc.prescaler, "adc.acquisition_time": adc.acquisition_time,
+                "adc.oversampling_rate": adc.oversampling_rate}
+            self._listener.on_note(
+                f"sample_rate {sensor.options.sample_rate:g}/s: nearest is "
+                f"{adc.sample_rate / sensor.format.channel_count:.6g}/s with prescaler "
+                f"{adc.prescaler}, acquisition time {adc.acquisition_time} and oversampling rate "
+                f"{adc.oversampling_rate}")
+
+    def _write_wanted(self, changes: Mapping[str, Value]) -> object:
+        return self.write(self.sensor, changes)
+
+    def _choose_calibrations(self) -> None:
+        for complaint in self.sensor.choose_calibrations():
+            self._listener.on_note(complaint, warning=True)
+
+    # --- streaming ---
+
+    def _serve(self) -> None:
+        """Receive the stream, or check the connection; read something now and then."""
+        if self.sensor.decoder is not None:
+            self.line.listen(LISTEN_TIME)
+            if time.monotonic() - self._last_frame > SILENCE:
+                self._look_after_stream()
+        else:
+            if not self.line.request(commands.CHECK_CONNECTED.request(STU_1)):
+                raise NoAnswerError("the sensor disconnected")
+            self.sensor.due = time.monotonic() + KEEP_ALIVE
+        if time.monotonic() >= self._next_reading:
+            self._read_next()
+
+    def _start_or_stop(self) -> None:
+        if self.sensor.phase is not Phase.CONNECTED:
+            return
+        if self._active and self.sensor.enabled:
+            if self.sensor.decoder is None:
+                self._start()
+        else:
+            self._stop()
+        self.sensor.due = 0.0
+
+    def _start(self) -> None:
+        sensor = self.sensor
+        form = sensor.format
+        sensor.decoder = StreamDecoder(form, form.frame_rate(sensor.adc.sample_rate))
+        sensor.clock = SampleClock(sensor.sample_rate)
+        self.line.on_stream = self._stream_handler(sensor)
+        self._last_frame = time.monotonic()
+        self.line.request(commands.START_ACCELERATION.request(STH_1, form))
+
+    def _stream_handler(self, sensor: Sensor) -> Callable[[bytearray, int], None]:
+        """Return what is done with each frame of the stream: the hot path."""
+        decoder, clock = sensor.decoder, sensor.clock
+        assert decoder is not None
+        decode, data_sets, update = decoder.decode_frame, decoder.format.data_sets, clock.update
+        publish, monotonic = self._listener.on_stream(sensor), time.monotonic
+        lost = 0
+
+        def handle(data: bytearray, now: int) -> None:
+            nonlocal lost
+            values = decode(now * 1e-9, data)
+            if values is None:
+                return
+            self._last_frame = monotonic()
+            number = decoder.number * data_sets
+            update(number + data_sets - 1, now)
+            publish(clock.time_of(number), clock.period, values)
+            if decoder.statistics.lost != lost:
+                if not lost:
+                    self._listener.on_note(f"{decoder.statistics.lost} frames were lost on the "
+                                           "radio; more are counted in the diagnostics only",
+                                           warning=True)
+                lost = decoder.statistics.lost
+
+        return handle
+
+    def _stop(self) -> None:
+        if self.sensor.decoder is not None:
+            self.line.request(commands.STOP_ACCELERATION.request(STH_1))
+            self.line.on_stream = None
+            self.sensor.end_stream()
+
+    @contextlib.contextmanager
+    def _stopped_for(self, changes: Mapping[str, Value]) -> Iterator[None]:
+        """Stop the stream around changes that need it, or that change how it is decoded."""
+        streaming = self.sensor.decoder is not None and any(
+            name.startswith("calibration.") or SETTINGS[name].needs_stop
+            for name in changes if name in SETTINGS)
+        if streaming:
+            self._stop()
+        try:
+            yield
+        finally:
+            if streaming:
+                self._start_or_stop()
+
+    def _look_after_stream(self) -> None:
+        """React to a stream that fell silent: start it again where the sensor is still there."""
+        if not self.line.request(commands.CHECK_CONNECTED.request(STU_1)):
+            raise NoAnswerError("the sensor was lost while it streamed")
+        self.line.on_stream = None
+        self.sensor.end_stream()
+        self._listener.on_note("the stream fell silent; starting it again", warning=True)
+        self._start_or_stop()
+
+    # --- losing ---
+
+    def _lose(self, error: DriverError) -> None:
+        """Note that the sensor is not there; look for it more and more rarely."""
+        sensor = self.sensor
+        was_there = sensor.phase is not Phase.SEARCHING
+        news = was_there or _without_rssi(sensor.error) != _without_rssi(error)
+        if isinstance(error, NoAnswerError):
+            sensor.time_outs += 1
+        self._forget()
+        sensor.error = error
+        sensor.due = time.monotonic() + sensor.backoff.pause()
+        if was_there:
+            self._searching_since = time.monotonic()
+        if news:
+            self._listener.on_lost(sensor, error)
+
+    def _forget(self) -> None:
+        self.line.on_stream = None
+        if self.sensor.decoder is not None:
+            self.sensor.end_stream()
+        self.sensor.phase = Phase.SEARCHING
+        self.sensor.identity = None
+        self.sensor.target = None
+        self.sensor.seen = []
+
+    def _disconnect(self) -> None:
+        """Stop the stream and release the sensor, so that it can sleep."""
+        if self.sensor.phase is Phase.CONNECTED:
+            with contextlib.suppress(NoAnswerError, RefusedError, FrameError):
+                self._stop()
+        if self.sensor.phase is not Phase.SEARCHING:
+            self.line.request(commands.DEACTIVATE_BLUETOOTH.request(STU_1), DISCONNECT_TIMEOUT)
+
+    # --- requests ---
+
+    def _require(self) -> None:
+        if self.sensor.phase is not Phase.CONNECTED:
+            reason = self.link_error or self.sensor.error or self.sensor.phase.value
+            raise NoAnswerError(f"the sensor is not connected: {reason}")
+
+    def _read_next(self) -> None:
+        """Read one of the things that are read now and then; what is refused is left out."""
+        period = self.sensor.options.status_period
+        self._next_reading = time.monotonic() + period / len(_READINGS)
+        name, make_request, convert = next(self._readings)
+        try:
+            value = convert(self.sensor, self.line.request(make_request()))
+        except (RefusedError, FrameError, NoAnswerError):
+            value = None
+        setattr(self.sensor.readings, name, value)
+        if value is not None:
+            self._listener.on_readings(self.sensor, name)
+
+    def _read_field(self, node: int, field: Field) -> FieldValue:
+        return field.decode(b"".join(
+            self.line.request(commands.READ_EEPROM.request(node, field.page, offset, length))
+            for offset, length in field.chunks))
+
+    def _write_field(self, field: Field, value: FieldValue) -> None:
+        data = field.encode(value)
+        for offset, length in field.chunks:
+            start = offset - field.offset
+            self.line.request(commands.WRITE_EEPROM.request(
+                STH_1, field.page, offset, data[start:start + length]))
+
+
+def _raw(field: Field, value: FieldValue) -> bytes:
+    """Return the bytes of a value that was read, also of a number that cannot be written."""
+    try:
+        return field.encode(value)
+    except SettingError:
+        return b""
+
+
+def _without_rssi(error: DriverError | None) -> str:
+    """Return an error without what changes at every look."""
+    return re.sub(r"-?\d+ dBm", "", str(error))
+
+
+def _described(options: Options) -> str:
+    parts = [f' "{options.sensor_name}"'] if options.sensor_name else []
+    parts += [f" {options.sensor_mac.upper()}"] if options.sensor_mac else []
+    parts += [f" number {options.sensor_number}"] if options.sensor_number >= 0 else []
+    return "".join(parts)
+
+
+class _Access:
+    """The records of the sensor, for `read_settings` and `write_settings`."""
+
+    def __init__(self, line: Line) -> None:
+        self._line = line
+
+    def read_record(self, record: Record) -> tuple[Raw, ...]:
+        """Return the raw fields of a record."""
+        assert isinstance(record, IcotronicRecord)
+        return record.decode_answers([self._line.request(request)
+                                      for request in record.read_requests(STH_1)])
+
+    def write_record(self, record: Record, values: tuple[Raw, ...]) -> None:
+        """Write all fields of a record."""
+        assert isinstance(record, IcotronicRecord)
+        for request in record.write_requests(STH_1, values):
+            self._line.request(request)
+
+
+def _as_it_is(sensor: Sensor, value: T) -> T:
+    return value
+
+
+def _battery_voltage(sensor: Sensor, values: tuple[int, ...]) -> float:
+    return supply_voltage(values[0], sensor.adc.reference_voltage)
+
+
+# What is read now and then: name in Readings, request, conversion.
+_READINGS: tuple[tuple[str, Callable[[], Request[Any]], Callable[[Sensor, Any], Any]], ...] = (
+    ("rssi", lambda: commands.READ_RSSI.request(STH_1, SELF), _as_it_is),
+    ("battery_voltage", lambda: commands.read_voltage(STH_1), _battery_voltage),
+    ("temperature", lambda: commands.READ_TEMPERATURE.request(STH_1), _as_it_is),
+    ("sth_status", lambda: commands.READ_STH_STATUS.request(STH_1), _as_it_is),
+    ("stu_status", lambda: commands.READ_STU_STATUS.request(STU_1), _as_it_is),
+    ("sth_errors", lambda: commands.READ_STH_ERRORS.request(STH_1), _as_it_is),
+    ("stu_errors", lambda: commands.READ_STU_ERRORS.request(STU_1), _as_it_is),
+    ("power_cycles", lambda: commands.READ_POWER_CYCLES.request(STH_1), _as_it_is),
+    ("operating_time", lambda: commands.READ_OPERATING_TIME.request(STH_1), _as_it_is),
+    ("under_voltages", lambda: commands.READ_UNDER_VOLTAGES.request(STH_1), _as_it_is),
+    ("watchdog_resets", lambda: commands.READ_WATCHDOG_RESETS.request(STH_1), _as_it_is),
+)
+
+_MEASUREMENTS = tuple(
+    (element, dimension) for element, dimensions in (
+        (CalibrationElement.ACCELERATION, (1, 2, 3)), (CalibrationElement.VOLTAGE, (1, 2, 3)),
+        (CalibrationElement.GROUND, (1,)), (CalibrationElement.SUPPLY, (1,)),
+        (CalibrationElement.REGULATED_POWER, (1,)), (CalibrationElement.AMPLIFIER_OUTPUT, (1,)))
+    for dimension in dimensions)
+
+# Settings that the EEPROM can keep, and the field that keeps them.
+_STORED: Mapping[str, Field] = {
+    "name": STH_EEPROM["STH Name"],
+    "reduced_energy.sleep_time": STH_EEPROM["Sleep Time 1"],
+    "reduced_energy.advertisement_time": STH_EEPROM["Advertisement Time 1"],
+    "lowest_energy.sleep_time": STH_EEPROM["Sleep Time 2"],
+    "lowest_energy.advertisement_time": STH_EEPROM["Advertisement Time 2"],
+    **{f"calibration.{setting}.{part.lower()}": STH_EEPROM[f"{stored}: {part}"]
+       for setting, stored in zip(
+           ("acceleration_x", "acceleration_y", "acceleration_z", "voltage1", "voltage2",
+            "voltage3", "temperature1", "temperature2", "temperature3"), eeprom.CALIBRATED,
+           strict=True)
+       for part in ("Slope", "Offset")},
+}
