@@ -1,8 +1,9 @@
 """When a sample was taken, on the host's clock, from its place in the stream.
 
 A sensor samples at a steady pace; its frames arrive late, by a changing amount, but never early.
-So the earliest arrivals show the sensor's clock, and the line through them gives each sample its
-time. The line is fitted again once per window, which follows the drift between both clocks.
+So the earliest arrivals show the sensor's clock: the line with their slope that none of them lies
+before gives each sample its time, and no sample a time in the future. The line is fitted again
+once per window, which follows the drift between both clocks.
 """
 
 from __future__ import annotations
@@ -11,7 +12,6 @@ from collections import deque
 
 WINDOW = 1.0  # s of samples that give one earliest arrival
 WINDOWS = 30  # earliest arrivals that the line goes through
-SETTLED = 3  # of them make it trustworthy
 MAX_DEVIATION = 0.02  # of the nominal rate; beyond it an estimate is no clock
 RESTART = 0.5  # s of disagreement that mean another stream or a set clock
 
@@ -59,8 +59,8 @@ class SampleClock:
             self._least_delay, self._least_point = delay, (number, arrival)
         elif delay < self._least_delay:
             self._least_delay, self._least_point = delay, (number, arrival)
-        if delay < 0 and len(self._earliest) < SETTLED:
-            self.origin += delay  # nothing arrives before it was measured: the line lay too late
+        if delay < 0:  # nothing arrives before it was measured: the line lay too late
+            self.origin += delay
             self._least_delay = 0.0
 
     def time_of(self, number: int) -> int:
@@ -93,4 +93,4 @@ class SampleClock:
                     for number, arrival in points) / spread
         limit = MAX_DEVIATION * self.nominal_period
         self.period = min(max(slope, self.nominal_period - limit), self.nominal_period + limit)
-        self.origin = mean_arrival - mean_number * self.period
+        self.origin = min(arrival - number * self.period for number, arrival in points)

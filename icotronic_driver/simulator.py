@@ -853,10 +853,10 @@ class SimulatedStu(SimulatedNode):
 
 
 _FOREIGN = (  # what else can be on a bus: standard frames, other versions, hosts and nodes
-    CanFrame(0x04F, bytes.fromhex("A3 00 01 02 03 04 05 06"), extended=False),
-    CanFrame(0x1100004F, bytes.fromhex("A3 00 01 02 03 04 05 06")),
-    CanFrame(0x0100086F, bytes.fromhex("A3 00 01 02 03 04 05 06")),
-    CanFrame(0x01000150, bytes.fromhex("A3 00 01 02 03 04 05 06")),
+    CanFrame(0x04F, bytes.fromhex("A2 00 01 02 03 04 05 06"), extended=False),
+    CanFrame(0x1100004F, bytes.fromhex("A2 00 01 02 03 04 05 06")),
+    CanFrame(0x0100086F, bytes.fromhex("A2 00 01 02 03 04 05 06")),
+    CanFrame(0x01000150, bytes.fromhex("A2 00 01 02 03 04 05 06")),
     CanFrame(0x18FEF100, bytes.fromhex("FF FF FF")),
     CanFrame(0x123, b"", extended=False),
 )

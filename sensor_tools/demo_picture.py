@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+import numpy as np
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
@@ -16,6 +18,7 @@ Panel: TypeAlias = Callable[["Axes", "Comparison"], None]
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 TRUTH: dict[str, Any] = {"color": "black", "linewidth": 1.0, "alpha": 0.6, "zorder": 1}
 DOTS: dict[str, Any] = {"s": 16, "linewidths": 0, "alpha": 0.6, "zorder": 2}
+WAVEFORM_TIME = 0.06  # s
 ROW_SIZE = (16.0, 5.4)  # inches
 
 
@@ -89,6 +92,50 @@ def errors_over_time(axes: Axes, comparison: Comparison) -> None:
     axes.yaxis.set_major_formatter("{x:g}")
     axes.set_xlabel("time [s]")
     axes.set_ylabel(comparison.error_name)
+
+
+def waveform(axes: Axes, comparison: Comparison) -> None:
+    """Draw the first moments of a fast signal, sample by sample."""
+    axes.set_title("Every sample, on the truth")
+    curve, dots = (times < WAVEFORM_TIME for times in (comparison.curve_seconds,
+                                                       comparison.seconds))
+    axes.plot(1e3 * comparison.curve_seconds[curve], comparison.curves[curve, 0], label="truth",
+              **TRUTH)
+    axes.scatter(1e3 * comparison.seconds[dots], comparison.measured[dots], color=COLOURS[0],
+                 label=comparison.names[0], **DOTS)
+    axes.set_xlabel("time [ms]")
+    axes.set_ylabel(comparison.quantity)
+    axes.margins(y=0.15)
+    axes.legend(loc="upper center", ncols=2, frameon=False)
+
+
+def spectrum(axes: Axes, comparison: Comparison) -> None:
+    """Draw the power spectral density of a fast signal and of the truth."""
+    axes.set_title("Spectrum")
+    rate = (len(comparison.seconds) - 1) / comparison.seconds[-1]
+    for values, label, style in ((comparison.curves[:, 0], "truth", {**TRUTH, "zorder": 3}),
+                                 (comparison.measured, comparison.names[0],
+                                  {"color": COLOURS[0], "alpha": 0.7})):
+        axes.psd(values, NFFT=4096, Fs=rate, label=label, **style)
+    axes.set_xscale("log")
+    axes.set_xlim(10, rate / 2)
+    axes.set_xlabel("frequency [Hz]")
+    axes.set_ylabel("power spectral density [dB re (m/s²)²/Hz]")
+    axes.legend(loc="lower left", frameon=False)
+
+
+def error_shares(axes: Axes, comparison: Comparison) -> None:
+    """Draw how many values have at most which distance from the truth."""
+    axes.set_title("Distance from the truth")
+    shares = np.linspace(0, 100, 501)
+    for values, label, style in (
+            (comparison.errors, "measured", {"color": COLOURS[0], "linewidth": 2}),
+            (comparison.tolerances, "allowed", TRUTH)):
+        axes.plot(np.percentile(values, shares), shares, label=label, **style)
+    axes.set_xscale("log")
+    axes.set_xlabel(comparison.error_name)
+    axes.set_ylabel("share of the samples below [%]")
+    axes.legend(loc="lower right", frameon=False)
 
 
 def _tracks(comparison: Comparison) -> list[tuple[int, str]]:

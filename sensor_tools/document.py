@@ -17,11 +17,15 @@ from pathlib import Path
 
 from driver_common.device_node import DeviceNode
 from driver_common.settings import Option, Parameter, Setting, Value
+from icotronic_driver.node import IcotronicNode
+from icotronic_driver.settings import SETTINGS
 from isys_radar_driver.models import MODELS
 from isys_radar_driver.node import IsysRadarNode
 from isys_radar_driver.settings import settings_of
 
 ROOT = Path(__file__).resolve().parent.parent
+SEVERAL = (" With `sensors: [front, rear]` those of the driver that belong to a sensor, and all of "
+           "the device, come once per sensor, as in `front.address`.")
 WIDTH = 98  # of comments in a parameter file
 TYPES = {bool: "true or false", int: "integer", float: "float", str: "text", list: "list of words"}
 
@@ -69,6 +73,9 @@ DRIVERS = (
            {"serial_port": "/dev/ttyUSB0", "ip.address": "192.168.60.20",
             "ip.subnet_mask": "255.255.255.0", "ip.gateway": "192.168.60.1",
             "ip_destination.address": "192.168.60.30"}, "isys_settings.md"),
+    Driver("icotronic", "ICOtronic wireless accelerometers", IcotronicNode,
+           {"STH": SETTINGS}, {"can_channel": "can0", "name": "Spindle"},
+           "icotronic_settings.md"),
 )
 
 
@@ -160,8 +167,7 @@ def table(driver: Driver) -> str:
     return "\n".join([
         f"# Parameters of {driver.name}_node", "",
         "<!-- Made by 'python -m sensor_tools.document' from the tables in the code. -->", "",
-        f"For {driver.title}. With `sensors: [front, rear]` those of the driver that belong to a "
-        "sensor, and all of the device, come once per sensor, as in `front.address`.", "",
+        f"For {driver.title}." + SEVERAL * driver.node.SEVERAL_SENSORS, "",
         "## The driver", "",
         *_markdown(("Name", "Type", "Unit", "Range", "Default", "Description"),
                    _option_rows(driver)), "",

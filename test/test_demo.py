@@ -16,6 +16,7 @@ ROOT = Path(__file__).resolve().parent.parent
 DEADLINE = 60  # seconds
 TOPICS = {
     "/isys_radar/points": "sensor_msgs/msg/PointCloud2",
+    "/icotronic/imu/data_raw": "sensor_msgs/msg/Imu",
     "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
 }
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -110,7 +111,8 @@ def test_it_succeeds_and_says_what_came(finished):
     counts = summary("\n".join(output.splitlines()[-len(TOPICS):]))
     assert {name: kind for name, (kind, _) in counts.items()} == TOPICS
     assert counts["/isys_radar/points"][1] == pytest.approx(4 / 0.075, abs=4)
-    assert re.search(r"(\d+) of \1 values within resolution and .* of the truth", output)
+    assert counts["/icotronic/imu/data_raw"][1] == pytest.approx(4 * 9523.8, rel=0.05)
+    assert re.search(r"(\d+) of \1 values are as near to the truth", output)
 
 
 def test_the_bag_holds_what_came(finished):
