@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING
 from driver_common.errors import DriverError
 
 if TYPE_CHECKING:
-    from sensor_tools.demo_families import Comparison, Family, Topic
+    from sensor_tools.demo_comparison import Comparison
+    from sensor_tools.demo_families import Family, Topic
     from sensor_tools.demo_processes import Processes
     from sensor_tools.demo_recorder import Bag, Recorder
 

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
+from sensor_tools.demo_comparison import Comparison
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from sensor_tools.demo_families import Comparison
-
-Panel: TypeAlias = Callable[["Axes", "Comparison"], None]
+Panel: TypeAlias = Callable[["Axes", Comparison], None]
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 TRUTH: dict[str, Any] = {"color": "black", "linewidth": 1.0, "alpha": 0.6, "zorder": 1}

@@ -1,0 +1,63 @@
+"""Measured values beside the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import KW_ONLY, dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+ENOUGH = 0.95  # share of the values that must be within their tolerance
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Measured values beside the truth. The arrays have one entry per value.
+
+    Attributes:
+        quantity: What was measured, with its unit.
+        error_name: What the error is, with its unit.
+        seconds: When, since the first value.
+        tracks: Index of the curve that a value belongs to.
+        names: Name of each curve.
+        measured: The values; NaN where one is missing.
+        errors: Distance from the truth; infinite where a value is missing.
+        tolerances: Largest error that resolution and timing explain.
+        places: Positions (x, y) in m, if the sensor tells any.
+        curve_seconds: Times of the curves, which are the truth.
+        curves: Their values, one row per time and one column per track.
+        curve_places: Positions of the truth.
+        remark: What else is to be said.
+    """
+
+    quantity: str
+    error_name: str
+    _: KW_ONLY
+    seconds: Array
+    tracks: npt.NDArray[np.int64]
+    names: Sequence[str]
+    measured: Array
+    errors: Array
+    tolerances: Array
+    curve_seconds: Array
+    curves: Array
+    places: Array = field(default_factory=lambda: np.empty((0, 2)))
+    curve_places: Array = field(default_factory=lambda: np.empty((0, 0, 2)))
+    remark: str = ""
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the measurements agree with the truth."""
+        return bool(np.mean(self.errors <= self.tolerances) >= ENOUGH)
+
+    def __str__(self) -> str:
+        """Say how well the measurements agree with the truth, in one line."""
+        half, most = np.quantile(self.errors, (0.5, ENOUGH), method="higher")
+        within = np.count_nonzero(self.errors <= self.tolerances)
+        return (f"{within} of {self.errors.size} values are as near to the truth as resolution "
+                f"and timing allow; {self.error_name}: median {half:.3g}, "
+                f"95 % below {most:.3g}, allowed {np.min(self.tolerances):.3g} to "
+                f"{np.max(self.tolerances):.3g}" + (f"; {self.remark}" if self.remark else ""))
