@@ -23,7 +23,7 @@ from driver_common.errors import DriverError, RefusedError, SettingError
 Value: TypeAlias = bool | int | float | str | list[str]
 Raw: TypeAlias = int | float | bytes
 
-UNKNOWN = -1  # value of a code that is not in a setting's table
+UNKNOWN = -1  # raw value that a device cannot tell; value of a code that is not in a table
 
 
 @dataclass(frozen=True)
@@ -68,6 +68,9 @@ class Parameter:
             value = int(value)
         if self.choices is not None and _as_word(value) in self.choices:
             value = _as_word(value)
+        if isinstance(value, bool) and self.choices is not None:
+            word = "on" if value else "off"  # which YAML reads as true and false
+            value = word if word in self.choices else value
         if self.kind is list and isinstance(value, Sequence) and not isinstance(value, str):
             if all(isinstance(item, str) for item in value):
                 return list(value)
@@ -268,7 +271,7 @@ class Setting(Parameter):
             return str(ipaddress.IPv4Address(raw))
         if self.choices is not None:
             return next((word for word, code in self.choices.items() if code == raw),
-                        f"code_{raw}")
+                        "unknown" if raw == UNKNOWN else f"code_{raw}")
         if self.values:
             known = isinstance(raw, int) and 0 <= raw < len(self.values)
             value: Value = self.kind(self.values[int(raw)] if known else UNKNOWN)

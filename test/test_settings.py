@@ -31,6 +31,13 @@ NAME = Parameter("name", kind=str)
 NAMES = Parameter("names", kind=list)
 
 
+def test_on_and_off_are_words_even_where_yaml_made_them_booleans():
+    echo = Parameter("echo", kind=str, choices={"auto": 0, "on": 1, "off": 2})
+    assert (echo.check(True), echo.check(False)) == ("on", "off")
+    with pytest.raises(SettingError, match="one of fast, slow"):
+        Parameter("mode", kind=str, choices={"fast": 0, "slow": 1}).check(False)
+
+
 @pytest.mark.parametrize(("parameter", "value", "checked"), [
     (LEVEL, 12.5, 12.5),
     (LEVEL, -30.0, -30.0),
