@@ -33,6 +33,7 @@ setup(
             "icotronic_node = icotronic_driver.node:main",
             "isys_radar_node = isys_radar_driver.node:main",
             "simulate = sensor_tools.simulate:main",
+            "uc4000_node = uc4000_driver.node:main",
         ],
     },
 )

@@ -17,6 +17,9 @@ from isys_radar_driver.simulator import scene_of
 from msg_conversions.point_cloud import FIELD_NAMES
 from sensor_tools import demo_picture
 from sensor_tools.demo_comparison import Array, Comparison
+from uc4000_driver.commands import STEP as ULTRASONIC_STEP
+from uc4000_driver.simulator import scene_of as filling_of
+from uc4000_driver.telegram import FACTORY_ADDRESS
 
 STH_RESOLUTION = Calibration.of_range(SENSOR_RANGE).slope * STANDARD_GRAVITY  # m/s²
 TIMING = 0.010  # s by which a stamp may be off
@@ -135,6 +138,30 @@ def compare_vibration(messages: Sequence[Any]) -> Comparison:
         remark=f"common delay {1e3 * delay:.2g} ms")
 
 
+FILL_LEVEL_RATE = 10.0  # Hz
+
+
+def compare_fill_level(messages: Sequence[Any]) -> Comparison:
+    """Compare ranges with the simulator's container; too close to measure is -inf (REP-117)."""
+    truth = np.vectorize(filling_of(FACTORY_ADDRESS), otypes=[float])
+    times = np.array([seconds_of(message) for message in messages])
+    measured = np.array([message.range for message in messages])
+    true = truth(times)
+    speeds = np.abs(truth(times + 1e-3) - truth(times - 1e-3)) / 2e-3
+    tolerances = ULTRASONIC_STEP + TIMING * speeds
+    too_close = measured == -math.inf
+    hidden = too_close & (true < messages[0].min_range + tolerances)
+    errors = np.where(hidden, 0.0, np.abs(np.where(too_close, math.inf, measured) - true))
+    even = np.linspace(times[0], times[-1], 2 * len(times))
+    return Comparison(
+        "range [m]", "range error [mm]", seconds=times - times[0],
+        tracks=np.zeros(len(times), np.int64), names=["fill level"],
+        measured=np.where(np.isfinite(measured), measured, math.nan), errors=1e3 * errors,
+        tolerances=1e3 * tolerances, curve_seconds=even - times[0],
+        curves=truth(even)[:, np.newaxis],
+        remark=f"{np.count_nonzero(too_close)} in the blind zone" if too_close.any() else "")
+
+
 FAMILIES = (
     Family(
         f"{RADAR.name} radar",
@@ -155,4 +182,13 @@ FAMILIES = (
         (Topic("/icotronic/imu/data_raw", "sensor_msgs/msg/Imu", AdcConfiguration().sample_rate),),
         compare_vibration,
         (demo_picture.waveform, demo_picture.spectrum, demo_picture.error_shares)),
+    Family(
+        "UC4000 ultrasonic sensor",
+        Program("sensor_tools.simulate", ("uc4000", "--link", "{directory}/ultrasonic")),
+        Program("uc4000_driver.node",
+                ("--ros-args", "-p", "serial_port:={directory}/ultrasonic", "-p",
+                 f"rate:={FILL_LEVEL_RATE}")),
+        (Topic("/uc4000/range", "sensor_msgs/msg/Range", FILL_LEVEL_RATE),),
+        compare_fill_level,
+        (demo_picture.over_time, demo_picture.errors_over_time)),
 )

@@ -22,6 +22,8 @@ from icotronic_driver.settings import SETTINGS
 from isys_radar_driver.models import MODELS
 from isys_radar_driver.node import IsysRadarNode
 from isys_radar_driver.settings import settings_of
+from uc4000_driver.node import Uc4000Node
+from uc4000_driver.settings import ALL_SETTINGS as UC4000_SETTINGS
 
 ROOT = Path(__file__).resolve().parent.parent
 SEVERAL = (" With `sensors: [front, rear]` those of the driver that belong to a sensor, and all of "
@@ -76,6 +78,8 @@ DRIVERS = (
     Driver("icotronic", "ICOtronic wireless accelerometers", IcotronicNode,
            {"STH": SETTINGS}, {"can_channel": "can0", "name": "Spindle"},
            "icotronic_settings.md"),
+    Driver("uc4000", "Pepperl+Fuchs UC4000 ultrasonic sensors", Uc4000Node,
+           {"UC4000": UC4000_SETTINGS}, {"serial_port": "/dev/ttyUSB0"}, "uc4000_settings.md"),
 )
 
 

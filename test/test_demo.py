@@ -17,8 +17,10 @@ DEADLINE = 60  # seconds
 TOPICS = {
     "/isys_radar/points": "sensor_msgs/msg/PointCloud2",
     "/icotronic/imu/data_raw": "sensor_msgs/msg/Imu",
+    "/uc4000/range": "sensor_msgs/msg/Range",
     "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
 }
+PROCESSES = 2 * 3  # a simulator and a driver for each family
 PNG = b"\x89PNG\r\n\x1a\n"
 
 
@@ -57,13 +59,14 @@ class Demo:
         pytest.fail(f"{text!r} was not printed:\n{self.process.stderr.read()}")
 
     def children(self):
-        """Command lines of running processes that name the directory."""
+        """Command lines of running processes that this demonstration started."""
+        marker = f"TMPDIR={self.temporary}".encode()
         found = []
-        for path in Path("/proc").glob("[0-9]*/cmdline"):
+        for process in Path("/proc").glob("[0-9]*"):
             with contextlib.suppress(OSError):
-                command = path.read_bytes().replace(b"\0", b" ").decode(errors="replace")
-                if str(self.temporary) in command:
-                    found.append(command)
+                if (int(process.name) != self.process.pid
+                        and marker in (process / "environ").read_bytes().split(b"\0")):
+                    found.append((process / "cmdline").read_bytes().replace(b"\0", b" ").decode())
         return found
 
     def assert_nothing_is_left(self):
@@ -112,6 +115,7 @@ def test_it_succeeds_and_says_what_came(finished):
     assert {name: kind for name, (kind, _) in counts.items()} == TOPICS
     assert counts["/isys_radar/points"][1] == pytest.approx(4 / 0.075, abs=4)
     assert counts["/icotronic/imu/data_raw"][1] == pytest.approx(4 * 9523.8, rel=0.05)
+    assert counts["/uc4000/range"][1] == pytest.approx(4 * 10, abs=4)
     assert re.search(r"(\d+) of \1 values are as near to the truth", output)
 
 
@@ -150,7 +154,7 @@ def test_nothing_else_is_left(finished):
 def test_a_signal_ends_it_with_what_it_has(demo, number):
     process = demo.start("--duration", "60", "--bag", "recording")
     demo.wait_for_line("2 of 60 s")
-    assert len(demo.children()) == 2
+    assert len(demo.children()) == PROCESSES
     process.send_signal(number)
     output, errors = process.communicate(timeout=DEADLINE)
     assert (process.returncode, errors) == (128 + number, "")

@@ -1,0 +1,63 @@
+"""A simulated ICOtronic system on a CAN bus, served by socketcand."""
+
+from __future__ import annotations
+
+import argparse
+
+from icotronic_driver.simulator import simulated_network
+from sensor_tools.simulation import (
+    Simulation,
+    add_faults,
+    fault_commands,
+    set_faults,
+    switch,
+)
+
+DESCRIPTION = "ICOtronic accelerometers on a CAN bus, served by socketcand"
+FAULTS = {
+    "loss": "probability that a radio frame with measured values is lost",
+    "loss_run": "how many are lost in a row",
+    "duplicate": "probability that such a frame comes twice",
+    "jitter": "time in s by which such a frame comes late, at most",
+    "burst": "time in s for which such frames are held back, to come all at once",
+    "answer_loss": "probability that an answer of a sensor is lost",
+    "refused_connects": "how many attempts to connect fail",
+    "foreign": "frames per s on the bus that belong to something else"}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments."""
+    parser.add_argument("--name", action="append", metavar="NAME",
+                        help="name of a sensor (default: Test-STH); once for each sensor")
+    parser.add_argument("--listen", default="127.0.0.1:29536", metavar="HOST:PORT",
+                        help="where the socketcand server listens; port 0 takes a free one")
+    parser.add_argument("--channel", default="", help="the only channel (default: any)")
+    parser.add_argument("--uncalibrated", action="store_true",
+                        help="the sensors hold no calibration factors")
+    parser.add_argument("--can-fd", action="store_true", help="frames can have 64 bytes")
+    add_faults(parser, FAULTS)
+
+
+def open_simulation(options: argparse.Namespace) -> Simulation:
+    """Start the system; raises DriverError."""
+    server = simulated_network(options.name or ["Test-STH"], listen=options.listen,
+                               channel=options.channel, calibrated=not options.uncalibrated,
+                               can_fd=options.can_fd)
+    network = server.network
+    set_faults(network.faults, FAULTS, options)
+    server.start()
+
+    def away(name: str) -> None:
+        network.sensor(name).in_range = False
+
+    def back(name: str) -> None:
+        network.sensor(name).in_range = True
+
+    def power_cycle(name: str) -> None:
+        network.power_loss(network.sensor(name))
+
+    names = ", ".join(f"{sensor.name} ({sensor.mac})" for sensor in network.sensors)
+    return Simulation(
+        f"{server.host}:{server.port}: {names}",
+        {"silent": switch([network.faults], "silent"), "away": away, "back": back,
+         "power-cycle": power_cycle, **fault_commands(network.faults, FAULTS)}, server.close)

@@ -1,0 +1,49 @@
+"""Simulated iSYS radars on a serial line."""
+
+from __future__ import annotations
+
+import argparse
+
+from isys_radar_driver.models import MODELS
+from isys_radar_driver.simulator import simulated_line
+from sensor_tools.simulation import (
+    LINE_FAULTS,
+    Simulation,
+    add_line_arguments,
+    fault_commands,
+    numbers,
+    set_faults,
+    switch,
+)
+
+DESCRIPTION = "InnoSenT iSYS radars on a serial line"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments."""
+    parser.add_argument("--model", default="iSYS-4001", metavar="NAME[,NAME]",
+                        help=f"one of {', '.join(MODELS)}; several are on one line")
+    parser.add_argument("--address", default="", metavar="N[,N]",
+                        help="address of each radar (default: the model's)")
+    parser.add_argument("--baud", type=int, default=0, help="baud rate (default: the model's)")
+    add_line_arguments(parser)
+
+
+def open_simulation(options: argparse.Namespace) -> Simulation:
+    """Start the radars; raises DriverError."""
+    line, radars = simulated_line(
+        options.model.split(","), numbers(options.address, "--address"), baud_rate=options.baud,
+        link=options.link, listen=options.listen)
+    line.faults.echo = options.echo
+    set_faults(line.faults, LINE_FAULTS, options)
+    line.start()
+
+    def power_cycle(_: str) -> None:
+        for radar in radars:
+            radar.power_cycle()
+
+    names = ", ".join(f"{radar.model.name} at address {radar.address}" for radar in radars)
+    return Simulation(
+        f"{options.link or line.port}: {names}",
+        {"silent": switch(radars, "silent"), "clipping": switch(radars, "clipping"),
+         "power-cycle": power_cycle, **fault_commands(line.faults, LINE_FAULTS)}, line.close)

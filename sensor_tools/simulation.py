@@ -1,0 +1,97 @@
+"""What the simulators of all families have in common on the command line."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from driver_common.errors import DriverError
+
+LINE_FAULTS = {"drop": "probability that a reply is lost",
+               "corrupt": "probability that a byte of a reply is damaged",
+               "noise": "probability of random bytes in front of a reply",
+               "split": "pause in s in the middle of each reply",
+               "delay": "time in s added before each reply"}
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """A running simulator.
+
+    Attributes:
+        title: Where it is found, and what it simulates.
+        commands: What it can be told, by name; each gets the rest of the line.
+        close: Ends it.
+    """
+
+    title: str
+    commands: Mapping[str, Callable[[str], None]]
+    close: Callable[[], None]
+
+    @property
+    def help(self) -> str:
+        """The commands, for people."""
+        return ", ".join([*self.commands, "quit"])
+
+
+def add_line_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what every simulator on a serial line takes."""
+    parser.add_argument("--link", default="", metavar="PATH",
+                        help="make PATH a symbolic link to the pseudo-terminal")
+    parser.add_argument("--listen", default="", metavar="HOST:PORT",
+                        help="serve TCP instead of a pseudo-terminal")
+    parser.add_argument("--echo", action="store_true", help="the master hears its own bytes")
+    add_faults(parser, LINE_FAULTS)
+
+
+def add_faults(parser: argparse.ArgumentParser, names: Mapping[str, str]) -> None:
+    """Add an argument for each fault: name and what it means."""
+    for name, text in names.items():
+        parser.add_argument(f"--{name.replace('_', '-')}", type=float, default=0.0, help=text)
+
+
+def set_faults(faults: Any, names: Iterable[str], options: argparse.Namespace) -> None:
+    """Set the faults that were given as arguments."""
+    for name in names:
+        if getattr(options, name):
+            set_fault(faults, name, getattr(options, name))
+
+
+def set_fault(faults: Any, name: str, value: float) -> None:
+    """Set one fault, in the type that it has."""
+    setattr(faults, name, type(getattr(faults, name))(value))
+
+
+def fault_commands(faults: Any, names: Iterable[str]) -> dict[str, Callable[[str], None]]:
+    """Return a command per fault, which takes a number."""
+    def command(name: str) -> Callable[[str], None]:
+        return lambda argument: set_fault(faults, name, float(argument))
+
+    return {name: command(name) for name in names}
+
+
+def switch(targets: Iterable[Any], attribute: str) -> Callable[[str], None]:
+    """Return a command that takes on or off for an attribute of all targets."""
+    targets = list(targets)
+
+    def command(argument: str) -> None:
+        if argument not in ("on", "off"):
+            raise ValueError("say on or off")
+        for target in targets:
+            setattr(target, attribute, argument == "on")
+
+    return command
+
+
+def numbers(text: str, option: str) -> list[int]:
+    """Return the numbers in "1,2,7".
+
+    Raises:
+        DriverError: Something else is in it.
+    """
+    try:
+        return [int(part) for part in text.split(",") if part]
+    except ValueError:
+        raise DriverError(f"{option} takes numbers such as 1,2, not {text!r}") from None
