@@ -19,7 +19,8 @@ from typing import NamedTuple, Protocol
 from driver_common.errors import LinkError
 
 BATCH_TIME = 0.002  # s of frames that are sent at once
-ATTACH_TIME = 0.2  # s in which a new client that says nothing gets no frames
+IDLE_TIME = 0.05  # s after which the devices are asked again in any case
+ATTACH_TIME = 0.2  # s for which frames wait for a new client that says nothing
 MAX_WAITING = 1 << 20  # bytes that wait for a slow client; what comes on top is dropped
 MAX_MESSAGE = 4096  # bytes without an end after which they are no message
 EXTENDED_ID, STANDARD_ID = 0x1FFFFFFF, 0x7FF
@@ -132,7 +133,8 @@ class SimulatedBus:
             now = time.monotonic()
             due = self._devices.next_due(now)
             # Never sooner than a batch: what is due until then is sent together.
-            ready = self._selector.select(None if due is None else max(due - now, BATCH_TIME))
+            pause = IDLE_TIME if due is None else max(due - now, BATCH_TIME)
+            ready = self._selector.select(min(pause, IDLE_TIME))
             for key, events in ready:
                 if key.fd == self._wake_reader:
                     return
@@ -141,6 +143,9 @@ class SimulatedBus:
                 else:
                     self._serve(key.data, events)
             self._distribute(self._devices.poll(time.monotonic()))
+            for client in list(self._clients):
+                if client.waiting and client.events == selectors.EVENT_READ:
+                    self._send(client, b"")  # it may be attached by now
 
     def _accept(self) -> None:
         with contextlib.suppress(OSError):
@@ -163,7 +168,7 @@ class SimulatedBus:
     def _obey(self, client: _Client, message: str) -> None:
         """Carry out what a client says; whatever is not understood is answered with an error."""
         command, *words = message.split()
-        client.attached = client.raw
+        client.attach_time = 0.0
         if command == "send" and client.raw:
             with contextlib.suppress(ValueError):
                 frame = CanFrame.parse(words)
@@ -175,9 +180,9 @@ class SimulatedBus:
             self._send(client, b"< ok >")
             return
         elif command == "rawmode":
+            self._send(client, b"< ok >")
             client.raw = True
             client.attach_time = time.monotonic() + ATTACH_TIME
-            self._send(client, b"< ok >")
             return
         elif command == "echo":
             self._send(client, b"< echo >")
@@ -193,7 +198,7 @@ class SimulatedBus:
             return
         text = "".join(messages).encode()
         for client in list(self._clients):
-            if client is not sender and client.listens():
+            if client is not sender and client.raw:
                 self._send(client, text, len(messages))
 
     def _send(self, client: _Client, text: bytes, frames: int = 0) -> None:
@@ -202,6 +207,8 @@ class SimulatedBus:
             self.dropped += frames
             text = b""
         client.waiting += text
+        if client.attach_time > time.monotonic():
+            return
         try:
             if client.waiting:
                 del client.waiting[:client.socket.send(client.waiting)]
@@ -228,9 +235,8 @@ class _Client:
     Attributes:
         socket: Its connection.
         raw: Whether it asked for frames.
-        attached: Whether it has read the last answer of the greeting: python-can takes a frame
-            in the same piece for a wrong answer. It has when it sends something, or after a while.
-        attach_time: When it is taken to be attached in any case.
+        attach_time: When it has read the last answer of the greeting, unless it says something
+            before: python-can takes a frame in the same piece for a wrong answer.
         waiting: Bytes that it did not take yet.
         events: What the selector waits for.
     """
@@ -240,17 +246,10 @@ class _Client:
         self.socket.setblocking(False)
         self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.raw = False
-        self.attached = False
         self.attach_time = 0.0
         self.waiting = bytearray()
         self.events = selectors.EVENT_READ
         self._received = b""
-
-    def listens(self) -> bool:
-        """Whether it is to get frames."""
-        if self.raw and not self.attached:
-            self.attached = time.monotonic() >= self.attach_time
-        return self.attached
 
     def receive(self) -> list[str] | None:
         """Return the messages that it completed, None when it has gone; garbage is skipped."""

@@ -404,6 +404,10 @@ class _Stream:
         self.start, self.rate = start, rate
         self.sent = 0  # frames since the start
 
+    def times(self, first: int, count: int) -> Times:
+        """Return when values are measured."""
+        return self.start + np.arange(first, first + count) / self.rate
+
     def due(self, frame: int) -> float:
         """Return when a frame is sent."""
         return self.start + ((frame + 1) * self.format.data_sets - 1) / self.rate
@@ -500,7 +504,7 @@ class SimulatedSth(SimulatedNode):
     def sample_times(self, first: int, count: int, block_command: int = 0x00) -> Times:
         """Return when values of the running stream are measured, in s since the epoch."""
         stream = self.streams[block_command]
-        return self._wall_offset + stream.start + np.arange(first, first + count) / stream.rate
+        return stream.times(first, count) + self._wall_offset
 
     def advertisement_interval(self, now: float) -> float:
         """Return the s between two advertisements; long ones in the energy modes."""
@@ -644,7 +648,7 @@ class SimulatedSth(SimulatedNode):
             if count:
                 sets = stream.format.data_sets
                 first = stream.sent * sets
-                times = stream.start + np.arange(first, first + count * sets) / stream.rate
+                times = stream.times(first, count * sets)
                 head = np.empty((count, 2), np.uint8)
                 head[:, 0] = stream.format.encode()
                 head[:, 1] = np.arange(stream.counter, stream.counter + count)

@@ -24,11 +24,13 @@ ADC_MAX = 0xFFFF
 SUPPLY_DIVIDER = 5.7  # 470 kΩ and 100 kΩ, section 10.3.3.1
 STANDARD_GRAVITY = 9.80665  # m/s²
 COUNTER_TURN = 256
+HALF_TURN = COUNTER_TURN // 2
 
 LOAD_LIMIT, LOAD_MAXIMUM = 0.4, 0.6  # section 9.2.10
 
 _HEAD = 2  # format and counter
-_TIMING_SLACK = 0.25  # s; nothing on the way holds frames back for longer
+_MAX_DELAY = 0.25  # s; nothing on the way holds frames back for longer
+_SETTLED = 64  # frames by which a stream that catches up comes nearer within a turn, at least
 
 
 @dataclass(frozen=True)
@@ -215,12 +217,32 @@ class StreamBatch:
         return len(self.numbers)
 
 
+@dataclass
+class _Doubt:
+    """A gap in which frames were late, or lost by whole turns of the counter.
+
+    Attributes:
+        number: Number of the last frame in front of the gap.
+        before: When it arrived, in s.
+        since: From when on the frames behind the gap are watched, in s.
+        late: How late they were before that, in frames.
+        least: How late the least late one has been since then.
+    """
+
+    number: int
+    before: float
+    since: float
+    late: float
+    least: float = math.inf
+
+
 class StreamDecoder:
     """Decodes the data frames of one stream, and counts what is missing.
 
     A frame is identified by its number: 0 for the first that arrived, from there by the 8-bit
     counter (errata C7). So value `i` of data set `j` in frame `n` was measured
-    `n * data_sets + j` sample intervals after the first one, whatever was lost in between.
+    `n * data_sets + j` sample intervals after the first one, whatever was lost in between. The
+    counter hides whole turns (80 ms at the sensor's usual pace); the time tells of those.
 
     Attributes:
         format: Format of the stream.
@@ -233,8 +255,7 @@ class StreamDecoder:
 
         Args:
             format: Format of the stream.
-            frame_rate: Frames per s; where it is known, whole turns of the counter that were lost
-                in a long silence are counted too.
+            frame_rate: Frames per s; where it is 0, whole turns of the counter go unnoticed.
         """
         self.format = format
         self.statistics = StreamStatistics()
@@ -244,10 +265,13 @@ class StreamDecoder:
         self._length = format.frame_length
         self._counter = 0
         self._arrival = 0.0
+        self._last: bytes | bytearray = b""
+        self._doubt: _Doubt | None = None
+        self._usual_gap = min(_MAX_DELAY, HALF_TURN / frame_rate) if frame_rate else math.inf
         padding = self._length - _HEAD - format.values_per_frame * format.value_size
         wide = format.value_size == 3
         self._unpack = struct.Struct(
-            f"<BB{('HB' if wide else 'H') * format.values_per_frame}{padding}x").unpack
+            f"<{_HEAD}x{('HB' if wide else 'H') * format.values_per_frame}{padding}x").unpack
         self._wide = wide
 
     def decode_frame(self, arrival: float, data: bytes | bytearray) -> tuple[int, ...] | None:
@@ -259,23 +283,25 @@ class StreamDecoder:
         if len(data) != self._length:
             self._count_unfit(data)
             return None
-        code, counter, *values = self._unpack(data)
-        if code != self._code:
+        if data[0] != self._code:
             self.statistics.others += 1
             return None
+        counter = data[1]
         step = (counter - self._counter) & 0xFF
-        if step != 1 or arrival - self._arrival > _TIMING_SLACK:
-            step = self._unusual_step(step, arrival)
+        if step != 1 or self._doubt or arrival - self._arrival > self._usual_gap:
+            step = self._unusual_step(step, arrival, data)
             if step == 0:
                 return None
         self._counter = counter
         self._arrival = arrival
+        self._last = data
         self.number += step
         self.statistics.frames += 1
+        values = self._unpack(data)
         if self._wide:
             return tuple(low | high << 16 for low, high in zip(values[::2], values[1::2],
                                                                strict=True))
-        return tuple(values)
+        return values
 
     def decode(self, frames: Sequence[tuple[float, bytes | bytearray]]) -> StreamBatch:
         """Return the data frames among `frames`, each given with its arrival time in s."""
@@ -285,18 +311,18 @@ class StreamDecoder:
                         ) -> StreamBatch | None:
         """Return all frames at once where they follow each other without fault, else None."""
         count, length = len(frames), self._length
-        if self.number < 0 or not count or {len(data) for _, data in frames} != {length}:
+        if self.number < 0 or self._doubt or {len(data) for _, data in frames} != {length}:
             return None
         joined = b"".join([data for _, data in frames])
         table = np.frombuffer(joined, np.uint8).reshape(count, length)
         counters = np.arange(self._counter + 1, self._counter + 1 + count).astype(np.uint8)
         arrivals = np.array([arrival for arrival, _ in frames])
         if ((table[:, 0] != self._code).any() or (table[:, 1] != counters).any()
-                or np.diff(arrivals, prepend=self._arrival).max() > _TIMING_SLACK):
+                or np.diff(arrivals, prepend=self._arrival).max() > self._usual_gap):
             return None
         numbers = np.arange(self.number + 1, self.number + 1 + count)
         self._counter = int(counters[-1])
-        self._arrival = float(arrivals[-1])
+        self._arrival, self._last = frames[-1]
         self.number += count
         self.statistics.frames += count
         return StreamBatch(numbers, arrivals, self._values(table))
@@ -324,23 +350,43 @@ class StreamDecoder:
         return StreamBatch(np.array(numbers, np.int64), np.array(arrivals, np.float64),
                            np.array(rows, kind).reshape(shape))
 
-    def _unusual_step(self, step: int, arrival: float) -> int:
-        """Return the frames from the last to this one, 0 for a duplicate; count what is missing.
-
-        The counter hides whole turns. After a silence that nothing on the way can have caused,
-        the time tells how many there were.
-        """
+    def _unusual_step(self, step: int, arrival: float, data: bytes | bytearray) -> int:
+        """Return the frames from the last to this one, 0 for a duplicate; count what is missing."""
         if self.number < 0:
             return 1
         silence = arrival - self._arrival
-        if silence > _TIMING_SLACK:
-            turns = round((silence * self._frame_rate - step) / COUNTER_TURN)
-            step += COUNTER_TURN * max(turns, 0)
+        if step == 0 and data != self._last and self._frame_rate:
+            step = COUNTER_TURN  # it is none that came again
+        turns = max(0, round((silence * self._frame_rate - step) / COUNTER_TURN))
+        if silence > _MAX_DELAY:
+            step += COUNTER_TURN * turns
+        elif turns and self._doubt is None:
+            self._doubt = _Doubt(self.number, self._arrival, arrival,
+                                 silence * self._frame_rate - step)
         if step == 0:
             self.statistics.duplicates += 1
-        else:
-            self.statistics.lost += step - 1
+            return 0
+        if self._doubt is not None:
+            step += self._missed_turns(self._doubt, self.number + step, arrival)
+        self.statistics.lost += step - 1
         return step
+
+    def _missed_turns(self, doubt: _Doubt, number: int, arrival: float) -> int:
+        """Return the frames that were lost unseen in a gap, once it is clear, until then 0.
+
+        Frames that were only late come faster than usual afterwards, until they have caught up;
+        where some were lost, the rest stays late.
+        """
+        late = (arrival - doubt.before) * self._frame_rate - (number - doubt.number)
+        doubt.least = min(doubt.least, late)
+        if late < HALF_TURN:
+            self._doubt = None
+        elif (arrival - doubt.since) * self._frame_rate > COUNTER_TURN:
+            if doubt.least > doubt.late - _SETTLED:
+                self._doubt = None
+                return COUNTER_TURN * round(doubt.least / COUNTER_TURN)
+            doubt.since, doubt.late, doubt.least = arrival, doubt.least, math.inf
+        return 0
 
     def _count_unfit(self, data: bytes | bytearray) -> None:
         if data and data[0] != self._code:
