@@ -103,8 +103,10 @@ class SimulatedLine:
         self.port = self._transport.port
         self._due: list[tuple[float, int, bytes]] = []
         self._order = itertools.count()
+        self._late_until = 0.0
         self._busy: list[tuple[float, float]] = []  # when the line is taken, from … until
         self._wake_reader, self._wake_writer = os.pipe()
+        self._closed = False
         self._thread = threading.Thread(target=self._run, name="simulated line", daemon=True)
 
     def start(self) -> SimulatedLine:
@@ -114,13 +116,15 @@ class SimulatedLine:
 
     def close(self) -> None:
         """Take the line away, as if it were unplugged."""
+        if self._closed:  # its descriptors may belong to others by now
+            return
+        self._closed = True
         if self._thread.is_alive():
             os.write(self._wake_writer, b".")
             self._thread.join()
         self._transport.close()
-        with contextlib.suppress(OSError):
-            os.close(self._wake_reader)
-            os.close(self._wake_writer)
+        os.close(self._wake_reader)
+        os.close(self._wake_writer)
 
     def _run(self) -> None:
         while True:
@@ -143,7 +147,9 @@ class SimulatedLine:
             self._schedule(now, data)
         for due, reply in self._device.receive(data, arrived):
             for piece_due, piece in self.faults.apply(due, reply):
-                self._schedule(piece_due, piece)
+                self._schedule(max(piece_due, self._late_until), piece)
+                if self.faults.delay:
+                    self._late_until = piece_due  # nothing overtakes what is under way
 
     @property
     def _byte_time(self) -> float:

@@ -1,0 +1,260 @@
+"""ROS 2 node of the UC4000: parameters, topics, services and diagnostics around a Uc4000Bus."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from math import pi
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from sensor_msgs.msg import Range, Temperature
+
+from driver_common import diagnostics
+from driver_common.device_node import DeviceNode, run
+from driver_common.errors import DriverError, SettingError
+from driver_common.settings import Option
+from driver_common.simulated_line import SimulatedLine
+from msg_conversions.range import NO_ECHO_VALUES, distance_or_no_echo, to_range
+from msg_conversions.temperature import to_temperature
+from uc4000_driver.commands import MAX_CYCLES, PROFILES, Outcome
+from uc4000_driver.line import ECHO_CHOICES
+from uc4000_driver.sensor import Measurement, Options, Sensor
+from uc4000_driver.session import OPERATING_TEMPERATURE, Listener, Uc4000Bus
+from uc4000_driver.settings import ALL_SETTINGS
+from uc4000_driver.simulator import simulated_line
+from uc4000_driver.telegram import BAUD_RATE, LAST_ADDRESS, error_text
+
+SIMULATED = "sim://"
+FIELD_OF_VIEW = 0.26  # rad, 15°: assumed, the manual only draws the cones (errata U12)
+
+
+def _words(*words: str) -> dict[str, int]:
+    return {word: index for index, word in enumerate(words)}
+
+
+class Uc4000Node(DeviceNode, Listener):
+    """Driver of one or several UC4000 sensors on a wire."""
+
+    BUS_OPTIONS = (
+        Option("serial_port", kind=str, default="",
+               description="Device path, pyserial URL such as socket://host:port, or sim://UC4000"),
+        Option("local_echo", kind=str, choices=_words(*ECHO_CHOICES), default="auto", live=True,
+               description="Whether the line returns what is sent, as a single LIN wire does; "
+                           "auto = find out"),
+        Option("groups", kind=list, default=[],
+               description='Sensors that do not hear each other and may measure at the same time, '
+                           'as in ["left right", "front rear"]; sensors in no group measure alone'),
+    )
+    SENSOR_OPTIONS = (
+        Option("address", kind=int, default=0, minimum=0, maximum=LAST_ADDRESS,
+               description="Address on the wire; 0 = ask (only one sensor may be connected)"),
+        Option("frame_id", kind=str, default="{sensor}_link", live=True,
+               description="Frame of the measurements, x along the sound"),
+        Option("profile", kind=str, choices=_words(*PROFILES), default="b", live=True,
+               description="Measurement profile: a = short range up to 3.5 m, b = middle, c = far, "
+                           "user = by burst_periods, gain_db and current_ma"),
+        Option("cycles", kind=int, default=1, minimum=1, maximum=MAX_CYCLES, live=True,
+               description="Cycles of 50 ms whose average is one measurement"),
+        Option("rate", kind=float, default=0.0, minimum=0.0, maximum=20.0, unit="Hz", live=True,
+               description="Measurements per second; 0 = as many as the cycles allow"),
+        Option("field_of_view", kind=float, default=FIELD_OF_VIEW, minimum=0.0, maximum=pi,
+               unit="rad", live=True,
+               description="Opening angle of the sound cone; the manual gives no number"),
+        Option("no_echo_value", kind=str, choices=_words(*NO_ECHO_VALUES), default="inf",
+               live=True, description="What is published where there is no echo, or one from "
+                                      "beyond 4 m; skip = nothing"),
+        Option("time_offset", kind=float, default=0.0, unit="s", live=True,
+               description="Added to every stamp; negative where the measurement was earlier"),
+        Option("temperature_period", kind=float, default=10.0, minimum=0.0, unit="s", live=True,
+               description="Time between two readings of the temperature; 0 = none"),
+        Option("new_address", kind=int, default=0, minimum=0, maximum=LAST_ADDRESS, live=True,
+               description="Address that the service ~/assign_address gives the sensor"),
+    )
+    ALL_SETTINGS = ALL_SETTINGS
+
+    def __init__(self) -> None:
+        """Declare the parameters; raises SettingError."""
+        self._simulator: SimulatedLine | None = None
+        self._publishers_of: dict[str, dict[str, Any]] = {}
+        super().__init__("uc4000")
+
+    # --- set-up ---
+
+    def make_bus(self) -> Uc4000Bus:
+        """Return the bus, with a simulator behind it where that was asked for."""
+        options = [self._sensor_options(sensor) for sensor in self.sensors]
+        port: str = self.option("serial_port")
+        if port.startswith(SIMULATED):
+            self._simulator, _ = simulated_line(
+                [option.address for option in options if option.address],
+                product=port.removeprefix(SIMULATED))
+            self._simulator.faults.echo = self.option("local_echo") == "on"
+            port = self._simulator.start().port
+        return Uc4000Bus(port, options, self, local_echo=self.option("local_echo"),
+                         groups=self.option("groups"))
+
+    def release(self) -> None:
+        """End the simulator."""
+        if self._simulator is not None:
+            self._simulator.close()
+            self._simulator = None
+
+    def _sensor_options(self, sensor: str) -> Options:
+        options = Options(
+            name=sensor, address=self.option("address", sensor),
+            wanted=self.wanted_settings(sensor), config_mode=self.option("config_mode"))
+        self._set_live(options)
+        return options
+
+    def _set_live(self, options: Options) -> None:
+        """Hand over the options that may change at run time."""
+        options.profile = self.option("profile", options.name)
+        options.cycles = self.option("cycles", options.name)
+        options.rate = self.option("rate", options.name)
+        options.temperature_period = self.option("temperature_period", options.name)
+
+    def apply_options(self) -> None:
+        """Hand live options to the bus."""
+        if self.bus is not None:
+            self.bus.line.local_echo = self.option("local_echo")
+            for sensor in self.bus.devices:
+                self._set_live(sensor.options)
+
+    def make_interfaces(self, sensor: str) -> None:
+        """Create topics and services of a sensor."""
+        self._publishers_of[sensor] = {
+            "range": self.add_publisher(Range, sensor, "range"),
+            "temperature": self.add_publisher(Temperature, sensor, "temperature")}
+        self.add_trigger(sensor, "identify", lambda: self._identify(self._sensor(sensor)))
+        self.add_trigger(sensor, "assign_address",
+                         lambda: self._assign_address(self._sensor(sensor)))
+
+    def _sensor(self, name: str) -> Sensor:
+        sensor: Sensor = next(
+            sensor for sensor in self.bus.devices if sensor.options.name == name)
+        return sensor
+
+    # --- what the bus reports, in its thread ---
+
+    def on_found(self, sensor: Sensor) -> None:
+        """Show the sensor's settings as parameters."""
+        self.get_logger().info(f"{self._title(sensor)}: connected to {sensor.identity}, address "
+                               f"{sensor.address}")
+        self.show_settings(sensor.options.name, sensor)
+
+    def on_values(self, sensor: Sensor) -> None:
+        """Show the values that were read again."""
+        self.show_settings(sensor.options.name, sensor)
+
+    def on_lost(self, sensor: Sensor, error: DriverError) -> None:
+        """Log why there is no sensor."""
+        self.get_logger().error(f"{self._title(sensor)}: {error} (waiting for it)")
+
+    def on_note(self, sensor: Sensor, text: str, *, warning: bool = False) -> None:
+        """Log a line."""
+        if warning:  # rclpy takes one severity per line of code only
+            self.get_logger().warning(f"{self._title(sensor)}: {text}")
+        else:
+            self.get_logger().info(f"{self._title(sensor)}: {text}")
+
+    def on_measurement(self, sensor: Sensor, measurement: Measurement) -> None:
+        """Publish the distance."""
+        name, limits = sensor.options.name, measurement.profile.limits
+        distance = distance_or_no_echo(measurement.distance.value, limits[1],
+                                       self.option("no_echo_value", name))
+        if distance is not None:
+            self._publish(sensor, "range", to_range(
+                distance, limits, self.option("field_of_view", name),
+                *self._frame_and_stamp(sensor, measurement.stamp)))
+
+    def on_temperature(self, sensor: Sensor, celsius: float, stamp: int) -> None:
+        """Publish the temperature."""
+        self._publish(sensor, "temperature", to_temperature(
+            celsius, *self._frame_and_stamp(sensor, stamp)))
+
+    def _publish(self, sensor: Sensor, topic: str, message: Any) -> None:
+        self.while_running(self._publishers_of[sensor.options.name][topic].publish)(message)
+
+    def _frame_and_stamp(self, sensor: Sensor, stamp: int) -> tuple[str, int]:
+        name = sensor.options.name
+        offset: float = self.option("time_offset", name)
+        return self.option("frame_id", name), stamp + round(offset * 1e9)
+
+    @staticmethod
+    def _title(sensor: Sensor) -> str:
+        return sensor.options.name or "sensor"
+
+    # --- services, in the executor ---
+
+    def _identify(self, sensor: Sensor) -> str:
+        identity = self.call(lambda: self.bus.identify(sensor))
+        return f"{identity}, address {sensor.address}"
+
+    def _assign_address(self, sensor: Sensor) -> str:
+        name = sensor.options.name
+        prefix = self.prefix(name)
+        address = self.option("new_address", name)
+        if not address:
+            raise SettingError(f"set the parameter {prefix}new_address first")
+        old = sensor.address
+        self.call(lambda: self.bus.assign_address(sensor, address))
+        self.store.store({prefix + "address": address, prefix + "new_address": 0})
+        return (f"the sensor moved from address {old} to {address} and keeps it; put "
+                f"'{prefix}address: {address}' into your parameter file")
+
+    # --- diagnostics ---
+
+    def status_of(self, sensor: Sensor) -> DiagnosticStatus:
+        """Return identity, link, rate, errors, temperature and differing settings."""
+        identity, counts, line = sensor.identity, sensor.statistics, self.bus.line
+        values: dict[str, object] = {"port": line.port, "baud rate": BAUD_RATE,
+                                     "address": sensor.address}
+        if identity is not None:
+            values |= {"version": identity.version, "serial number": identity.serial_number,
+                       "profile": sensor.options.profile, "rate [Hz]": sensor.rate}
+        if sensor.temperature is not None:
+            values["temperature [°C]"] = sensor.temperature
+        values |= {
+            "measurements": counts.outcomes.total(), **{
+                f"measurements: {outcome.value}": counts.outcomes[outcome] for outcome in Outcome},
+            "time-outs": counts.timeouts, "checksum errors": counts.damaged,
+            **{f"refusals: {error_text(code)}": count
+               for code, count in sorted(counts.refusals.items())},
+            "refusals": counts.refusals.total(), "connections": counts.connections,
+            "stray bytes": line.stray_bytes,
+            "local echo": {None: "unknown", True: "on", False: "off"}[line.echo]}
+        for group in self.bus.groups:
+            if sensor.options.name in group.names:
+                values["failed measurements of its group"] = group.failures
+        values |= {f"{name} differs": f"wanted {wanted}, reported {reported}"
+                   for name, (wanted, reported) in sensor.differing.items()}
+        name = f"{self.get_name()}: {self._title(sensor)}"
+        hardware_id = f"{sensor.product} {identity.serial_number}" if identity else ""
+        return diagnostics.to_status(name, hardware_id, *self._health(sensor), values)
+
+    def _health(self, sensor: Sensor) -> tuple[bytes, str]:
+        """Return level and message of the diagnostics."""
+        if sensor.identity is None:
+            return diagnostics.ERROR, str(sensor.error or "searching")
+        if sensor.error is not None:
+            return diagnostics.WARN, str(sensor.error)
+        if sensor.misses:
+            return diagnostics.WARN, "does not answer"
+        if sensor.differing:
+            return diagnostics.WARN, f"{len(sensor.differing)} settings are not as wanted"
+        low, high = OPERATING_TEMPERATURE
+        if sensor.temperature is not None and not low <= sensor.temperature <= high:
+            return diagnostics.WARN, (f"{sensor.temperature:g} °C is outside of the operating "
+                                      f"range {low} … {high} °C")
+        if not self.bus.active:
+            return diagnostics.OK, "connected, not measuring"
+        message = f"{sensor.rate:.1f} measurements per second"
+        if len(sensor.arrivals) > 2 and sensor.rate < 0.9 * sensor.options.rate:
+            return diagnostics.WARN, f"{message} instead of {sensor.options.rate:g}"
+        return diagnostics.OK, message
+
+
+def main(args: Sequence[str] | None = None) -> None:
+    """Run the node."""
+    sys.exit(run(Uc4000Node, args))

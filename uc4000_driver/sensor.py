@@ -1,0 +1,152 @@
+"""One sensor on the wire: how it is to be used, what is known of it, and what was counted."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter, deque
+from dataclasses import dataclass, field
+
+from driver_common.device import Device, DeviceOptions
+from driver_common.settings import Raw
+from uc4000_driver.commands import PROFILES, Distance, Outcome, Profile
+from uc4000_driver.telegram import CAST
+
+PRODUCT = "UC4000"
+RATE_WINDOW = 5.0  # s over which the rate is measured
+
+
+@dataclass(frozen=True)
+class Identity:
+    """Who a sensor says it is (sections 5.1.7 and 5.3.2)."""
+
+    version: str
+    serial_number: str
+
+    def __str__(self) -> str:
+        """Return product, serial number and version."""
+        return f"{PRODUCT} {self.serial_number}, {self.version}"
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """A measured distance.
+
+    Attributes:
+        distance: What was found.
+        profile: With which profile.
+        stamp: The host's time in ns in the middle of the measurement.
+    """
+
+    distance: Distance
+    profile: Profile
+    stamp: int
+
+
+@dataclass
+class Statistics:
+    """What was counted for one sensor since the start."""
+
+    outcomes: Counter[Outcome] = field(default_factory=Counter)
+    refusals: Counter[int] = field(default_factory=Counter)  # by error code
+    timeouts: int = 0
+    damaged: int = 0
+    connections: int = 0
+
+
+@dataclass
+class Options(DeviceOptions):
+    """How one sensor is to be used.
+
+    Attributes:
+        address: Its address; 0 = ask by cast.
+        profile: Name of the measurement profile.
+        cycles: Measurement cycles whose average is one measurement.
+        rate: Measurements per second; 0 = as many as possible.
+        temperature_period: Time in s between two readings of the temperature; 0 = none.
+    """
+
+    address: int = CAST
+    profile: str = "b"
+    cycles: int = 1
+    rate: float = 0.0
+    temperature_period: float = 10.0
+
+
+class Sensor(Device):
+    """One sensor on the wire: what is known of it, and what was counted.
+
+    Attributes:
+        options: How it is to be used.
+        address: Its address, 0 while unknown.
+        identity: Who it is; None while it is not connected.
+        temperature: In °C; None while it was not read.
+        acknowledged: What was written where nothing can be read, by the record's name.
+        served: Monotonic time in s of the last step.
+        temperature_due: Monotonic time in s at which to read the temperature.
+        misses: Number of steps without a good answer.
+    """
+
+    def __init__(self, options: Options) -> None:
+        """Begin as an unknown sensor."""
+        super().__init__(options)
+        self.options = options
+        self.address = options.address
+        self.identity: Identity | None = None
+        self.temperature: float | None = None
+        self.acknowledged: dict[str, Raw] = {}
+        self.statistics = Statistics()
+        self.arrivals: deque[float] = deque()
+        self.served = 0.0
+        self.temperature_due = 0.0
+        self.misses = 0
+
+    def __str__(self) -> str:
+        """Return name and address for messages."""
+        where = f"address {self.address}" if self.address else "sensor"
+        return f"{self.options.name} ({where})" if self.options.name else where
+
+    @property
+    def product(self) -> str:
+        """Name of what is connected."""
+        return PRODUCT
+
+    @property
+    def profile(self) -> Profile:
+        """The measurement profile."""
+        return PROFILES[self.options.profile]
+
+    @property
+    def rate(self) -> float:
+        """Measurements per second."""
+        arrivals = tuple(self.arrivals)  # another thread may ask
+        if len(arrivals) < 2 or time.monotonic() - arrivals[-1] > RATE_WINDOW:
+            return 0.0
+        return (len(arrivals) - 1) / (arrivals[-1] - arrivals[0])
+
+    @property
+    def wants_temperature(self) -> bool:
+        """Whether it is time to read the temperature."""
+        return bool(self.options.temperature_period) and time.monotonic() >= self.temperature_due
+
+    def count(self, outcome: Outcome) -> None:
+        """Count a measurement."""
+        now = time.monotonic()
+        self.statistics.outcomes[outcome] += 1
+        self.arrivals.append(now)
+        while now - self.arrivals[0] > RATE_WINDOW:
+            self.arrivals.popleft()
+
+    def plan_next(self) -> None:
+        """Keep the rate; do not catch up on what was missed."""
+        now = time.monotonic()
+        period = 1 / self.options.rate if self.options.rate else 0.0
+        self.due = max(self.due + period, now) if self.due > now - period else now + period
+
+    def forget(self) -> None:
+        """Take note that the sensor is not connected any more."""
+        self.identity = None
+        self.temperature = None
+        self.acknowledged.clear()
+        self.arrivals.clear()
+        self.misses = 0
+        self.address = self.options.address
