@@ -6,6 +6,7 @@ import contextlib
 import errno
 import logging
 import os
+import re
 import socket
 from collections.abc import Sequence
 
@@ -15,6 +16,8 @@ from driver_common.errors import LinkError, SettingError
 from driver_common.settings import suggestion
 
 CONNECT_TIMEOUT = 2.0  # s
+GREETING = b"< hi >"  # of a socketcand server
+NUMBER = re.compile("-?[0-9]+")
 SEND_TIMEOUT = 0.5  # s
 RECEIVE_BUFFER = 4 * 1024 * 1024  # bytes; some seconds of the fastest stream
 _ADVICE = {
@@ -24,6 +27,8 @@ _ADVICE = {
     errno.EAFNOSUPPORT: "this kernel has no CAN; 'sudo modprobe can_raw' loads it",
     errno.EPERM: "no permission; bring the channel up as root, then a user may open it",
     errno.ECONNREFUSED: "nothing listens there; check host and port in can_options",
+    errno.ECONNRESET: "the server closed the connection",
+    errno.EPIPE: "the server closed the connection",
     errno.ENOBUFS: "the transmit buffer is full: nobody acknowledges; check wiring, termination "
                    "and bit rate",
 }
@@ -87,16 +92,20 @@ class CanLink:
             self._bus.shutdown()
 
     def _try_server(self, options: dict[str, object]) -> None:
-        """Connect once: python-can itself tries for ten seconds, without a pause."""
+        """Connect once: python-can tries for ten seconds, and waits for a greeting for ever."""
         host, port = options.get("host"), options.get("port")
         if not isinstance(host, str) or not isinstance(port, int):
             raise LinkError('socketcand needs can_options such as ["host=127.0.0.1", '
                             '"port=29536"]')
+        where = f"cannot open {self} at {host}:{port}"
         try:
-            socket.create_connection((host, port), CONNECT_TIMEOUT).close()
-        except OSError as error:
-            raise LinkError(f"cannot open {self} at {host}:{port}: "
-                            f"{self._reason(error)}") from error
+            with socket.create_connection((host, port), CONNECT_TIMEOUT) as server:
+                greeting = server.recv(len(GREETING))
+        except (OSError, OverflowError) as error:
+            raise LinkError(f"{where}: {self._reason(error)}") from error
+        if greeting != GREETING:
+            raise LinkError(f"{where}: that is no socketcand server; check host and port in "
+                            "can_options")
 
     def _enlarge_receive_buffer(self) -> None:
         """Let the kernel keep what arrives while this process waits for the processor."""
@@ -108,17 +117,20 @@ class CanLink:
     def _reason(self, error: BaseException) -> str:
         cause: BaseException | None = error
         while cause is not None:
-            number = getattr(cause, "errno", None) or getattr(cause, "error_code", None)
-            if number in _ADVICE:
-                return _ADVICE[number].format(channel=self.channel, bitrate=self._bitrate)
+            if isinstance(cause, OSError) and cause.errno in _ADVICE:
+                return _ADVICE[cause.errno].format(channel=self.channel, bitrate=self._bitrate)
             cause = cause.__cause__ or cause.__context__
         if self.interface not in can.VALID_INTERFACES:
             known = sorted(can.VALID_INTERFACES)
             return (f"python-can has no such interface{suggestion(self.interface, known)} "
                     f"(it has {', '.join(known)})")
+        if "buffer full" in str(error):
+            return _ADVICE[errno.ENOBUFS]
         if isinstance(error, TimeoutError):
             return "no answer; check host and port in can_options"
-        return str(error) or type(error).__name__
+        if isinstance(error, socket.gaierror):
+            return f"{error.strerror}; check host in can_options"
+        return str(error.__cause__ or error).partition("\n")[0] or type(error).__name__
 
 
 def parse_options(options: Sequence[str]) -> dict[str, object]:
@@ -133,5 +145,5 @@ def parse_options(options: Sequence[str]) -> dict[str, object]:
         if not separator or not name:
             raise SettingError(f'can_options must be like "host=127.0.0.1", not {option!r}')
         words: dict[str, object] = {"true": True, "false": False}
-        parsed[name] = int(text) if text.lstrip("-").isdigit() else words.get(text.lower(), text)
+        parsed[name] = int(text) if NUMBER.fullmatch(text) else words.get(text.lower(), text)
     return parsed

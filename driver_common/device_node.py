@@ -299,8 +299,10 @@ class DeviceNode(LifecycleNode):
                 response.message = str(error)
             except Exception as error:  # an exception here would end the node
                 response.message = f"internal error, please report it: {error!r}"
-            (self.get_logger().info if response.success else self.get_logger().error)(
-                f"{name}: {response.message}")
+            if response.success:  # rclpy takes one severity per line of code only
+                self.get_logger().info(f"{name}: {response.message}")
+            else:
+                self.get_logger().error(f"{name}: {response.message}")
             return response
 
         service = self.create_service(Trigger, self.topic(sensor, name), handle)

@@ -124,7 +124,8 @@ class DeviceThread(threading.Thread):
                 while not self._stopping:
                     self._run_jobs(self._bus.poll())
             except DriverError as error:
-                self._on_state(error)
+                if not self._stopping:
+                    self._on_state(error)
             except Exception as error:  # a bug must not end the driver
                 self._on_state(_internal(error))
             finally:

@@ -13,7 +13,7 @@ from collections import deque
 WINDOW = 1.0  # s of samples that give one earliest arrival
 WINDOWS = 30  # earliest arrivals that the line goes through
 MAX_DEVIATION = 0.02  # of the nominal rate; beyond it an estimate is no clock
-RESTART = 0.5  # s of disagreement that mean another stream or a set clock
+RESTART = 0.5e9  # ns of disagreement that mean another stream or a set clock
 
 
 class SampleClock:
@@ -50,7 +50,9 @@ class SampleClock:
         """
         arrival -= self.base
         delay = arrival - (self.origin + number * self.period)
-        if self._window_end < 0 or not -RESTART * 1e9 < delay < RESTART * 1e9:
+        if self._least_delay <= delay < RESTART and number < self._window_end:
+            return  # like most frames: not the earliest of the window
+        if self._window_end < 0 or not -RESTART < delay < RESTART:
             self._start(number, arrival + self.base)
             return
         if number >= self._window_end:

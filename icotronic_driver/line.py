@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import can
 
-from driver_common.can_link import CanLink
+from driver_common.can_link import CanLink, parse_options
 from driver_common.errors import FrameError, LinkError, NoAnswerError
 from icotronic_driver.commands import ACCELERATION_DATA, Request
 from icotronic_driver.identifier import SPU_1, Identifier, node_name, receiver_filter
@@ -24,7 +24,7 @@ ERROR_BUS_OFF = 0x40  # in the identifier of an error frame of the kernel
 FILTERS = (receiver_filter(SPU_1), (SPU_1 << 6, 0x1F << 6))  # for us; and as if from us
 STREAM_ID = ACCELERATION_DATA.encode()
 
-StreamHandler = Callable[[bytearray, int], None]
+StreamHandler = Callable[[bytearray, float, int], None]
 
 
 @dataclass
@@ -49,12 +49,17 @@ class Line:
 
     Attributes:
         counts: What was counted.
-        on_stream: Takes the data of each frame of the acceleration stream, and its arrival in ns
-            of host time.
+        on_stream: Takes the data of each frame of the acceleration stream, when it was on the bus
+            in s of the interface's clock, and its arrival in ns of host time.
     """
 
     def __init__(self, interface: str, channel: str, bitrate: int, options: Sequence[str]) -> None:
-        """Prepare the line; nothing is opened. For the arguments see `CanLink`."""
+        """Prepare the line; nothing is opened. For the arguments see `CanLink`.
+
+        Raises:
+            SettingError: An option has no "=".
+        """
+        parse_options(options)  # a wrong one is told now, and not at every attempt to open
         self.counts = LineCounts()
         self.on_stream: StreamHandler | None = None
         self._make_link = partial(CanLink, interface, channel, bitrate, options, FILTERS)
@@ -86,18 +91,19 @@ class Line:
     def listen(self, duration: float) -> None:
         """Receive for some s and hand over what arrives; raises LinkError."""
         link, handle = self.link, self.on_stream
-        receive, monotonic, now = link.receive, time.monotonic, time.time_ns
-        remaining, end = duration, monotonic() + duration
+        receive, monotonic = link.receive, time.monotonic_ns
+        now = monotonic()
+        end, host_time = now + int(duration * 1e9), time.time_ns() - now
         try:
-            while remaining > 0:
-                message = receive(remaining)
+            while now < end:
+                message = receive((end - now) * 1e-9)
                 if message is None:
                     return
+                now = monotonic()
                 if message.arbitration_id == STREAM_ID and handle and message.is_extended_id:
-                    handle(message.data, now())
+                    handle(message.data, message.timestamp, now + host_time)
                 else:
                     self._count(message)
-                remaining = end - monotonic()
         except (can.CanError, OSError) as error:
             raise link.lost(error) from error
 
@@ -127,7 +133,7 @@ class Line:
                     break
                 streamed = message.arbitration_id == STREAM_ID and message.is_extended_id
                 if streamed and self.on_stream:
-                    self.on_stream(message.data, time.time_ns())
+                    self.on_stream(message.data, message.timestamp, time.time_ns())
                 if (message.is_extended_id and not message.is_error_frame
                         and request.is_answered_by(message.arbitration_id, message.data)):
                     return request.result(message.arbitration_id, message.data)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from sensor_msgs.msg import BatteryState, Imu, Temperature
@@ -18,7 +19,7 @@ from icotronic_driver.commands import CLOCK
 from icotronic_driver.eeprom import PAGE_NAMES, Field, FieldValue
 from icotronic_driver.identifier import STH_1, STU_1
 from icotronic_driver.line import Line
-from icotronic_driver.sensor import Channel, Options, Phase, Sensor, UnitIdentity
+from icotronic_driver.sensor import Options, Phase, Sensor, UnitIdentity
 from icotronic_driver.session import IcotronicBus, Listener
 from icotronic_driver.settings import SETTINGS
 from icotronic_driver.simulator import SimulatedIcotronic, simulated_network
@@ -32,6 +33,7 @@ CHANNELS = {channels: code for code, channels in enumerate(
     ("x", "y", "z", "xy", "xz", "yz", "xyz"))}
 SIGNED_AXES = {sign + axis: code for code, (sign, axis) in enumerate(
     (sign, axis) for sign in ("", "-") for axis in AXES)}
+LOSS_LIMIT = 0.01  # share of the frames that may be lost without a warning
 QUEUE_TIME = 0.2  # s of samples that a publisher keeps for slow subscribers
 QUEUE_DEPTH = 2000  # enough for QUEUE_TIME at the default rate
 
@@ -126,8 +128,11 @@ class IcotronicNode(DeviceNode, Listener):
     def apply_options(self) -> None:
         """Hand live options to the bus; the stream begins anew with them."""
         if self.bus is not None and self.thread is not None:
-            self._set_live(self.bus.sensor.options)
-            self.thread.post(self.bus.restart_stream)
+            self.thread.post(partial(self._restart_with_options, self.bus))
+
+    def _restart_with_options(self, bus: IcotronicBus) -> None:
+        self._set_live(bus.sensor.options)
+        bus.restart_stream()
 
     def make_interfaces(self, sensor: str) -> None:
         """Create topics and services."""
@@ -174,7 +179,10 @@ class IcotronicNode(DeviceNode, Listener):
 
     def on_note(self, text: str, *, warning: bool = False) -> None:
         """Log a line."""
-        (self.get_logger().warning if warning else self.get_logger().info)(text)
+        if warning:  # rclpy takes one severity per line of code only
+            self.get_logger().warning(text)
+        else:
+            self.get_logger().info(text)
 
     def on_stream(self, sensor: Sensor) -> Callable[[int, float, tuple[int, ...]], None]:
         """Return what publishes the samples of a stream that begins: the hot path."""
@@ -187,11 +195,14 @@ class IcotronicNode(DeviceNode, Listener):
             variances[axis % 3] = self.option("linear_acceleration_stddev") ** 2
         template = ImuTemplate(variances, self.option("frame_id"))
         offset = round(self.option("time_offset") * 1e9)
-        places = [_place(channel, axis) for channel, axis in zip(sensor.channels, axes,
-                                                                 strict=True)]
-        make = _one_channel if len(places) == 1 else _several_channels
-        return self.while_running(
-            make(template.serialised, self._topics["imu"].publish, places, offset))
+        places = [_Place(0, 0.0, 0.0)] * 3
+        for number, (channel, axis) in enumerate(zip(sensor.channels, axes, strict=True)):
+            sign = -1.0 if axis >= 3 else 1.0
+            places[axis % 3] = _Place(number, sign * channel.slope, sign * channel.offset)
+        # publish() itself costs twice as much, because it looks at what it was given.
+        publish = self._topics["imu"].handle.publish_raw
+        return self.while_running(_publisher(
+            template.serialised, publish, places, len(sensor.channels), offset))
 
     def on_readings(self, sensor: Sensor, name: str) -> None:
         """Publish a reading that has a topic."""
@@ -270,78 +281,65 @@ class IcotronicNode(DeviceNode, Listener):
             "connections": sensor.connections, "time-outs": sensor.time_outs,
             "unsaved settings": ", ".join(sorted(sensor.unsaved))}
         values |= {f"{name} differs": f"wanted {wanted}, reported {reported}"
-                   for name, (wanted, reported) in sensor.differing.items()}
-        hardware_id = (f"{sensor.identity.name} {sensor.identity.mac}" if sensor.identity else "")
-        return diagnostics.to_status(f"{self.get_name()}: sensor", hardware_id,
+                   for name, (wanted, reported) in dict(sensor.differing).items()}
+        identity = sensor.identity
+        return diagnostics.to_status(f"{self.get_name()}: sensor",
+                                     f"{identity.name} {identity.mac}" if identity else "",
                                      *self._health(sensor), values)
 
     def _health(self, sensor: Sensor) -> tuple[bytes, str]:
         """Return level and message of the diagnostics."""
         if sensor.phase is not Phase.CONNECTED:
             return diagnostics.ERROR, str(sensor.error or sensor.phase.value)
-        bitrate = self.option("can_bitrate")
+        bitrate, counts, complaints = self.option("can_bitrate"), sensor.statistics, []
+        if self.bus.line.counts.other_host:
+            complaints.append("another host on the bus uses our node number (SPU 1); end one of "
+                              "the two")
+        if counts.lost > LOSS_LIMIT * counts.frames:
+            complaints.append(f"{counts.lost} frames lost on the radio; bring the sensor nearer")
+        if sensor.differing:
+            complaints.append(f"{len(sensor.differing)} settings are not as wanted")
         load = sensor.load_warning(bitrate)
         if load:
-            return (diagnostics.ERROR if sensor.bus_load(bitrate) > LOAD_MAXIMUM
-                    else diagnostics.WARN), load
-        if self.bus.line.counts.other_host:
-            return diagnostics.WARN, ("another host on the bus uses our node number (SPU 1); end "
-                                      "one of the two")
-        if sensor.differing:
-            return diagnostics.WARN, f"{len(sensor.differing)} settings are not as wanted"
+            complaints.append(load)
+        if load and sensor.bus_load(bitrate) > LOAD_MAXIMUM:
+            return diagnostics.ERROR, "; ".join(complaints)
+        if complaints:
+            return diagnostics.WARN, "; ".join(complaints)
         if sensor.decoder is None:
             return diagnostics.OK, "connected, acquisition stopped"
-        counts = sensor.statistics
-        message = f"{sensor.measured_rate:.6g} samples per second, {counts.lost} frames lost"
-        if counts.lost > 0.01 * counts.frames:
-            return diagnostics.WARN, message
-        return diagnostics.OK, message
+        return diagnostics.OK, (f"{sensor.measured_rate:.6g} samples per second, {counts.lost} "
+                                "frames lost")
 
 
-def _place(channel: Channel, axis: int) -> tuple[int, float, float]:
-    """Return axis, slope and offset of a channel in the frame of the message."""
-    sign = -1.0 if axis >= 3 else 1.0
-    return axis % 3, sign * channel.slope, sign * channel.offset
+class _Place(NamedTuple):
+    """Which value of a sample belongs to an axis, and what makes it m/s².
+
+    With slope and offset 0 it is an axis that is not measured.
+    """
+
+    number: int
+    slope: float
+    offset: float
 
 
-Serialise = Callable[..., bytes]
-Publish = Callable[[bytes], None]
-
-
-def _one_channel(serialise: Serialise, publish: Publish, places: Sequence[tuple[int, float, float]],
-                 stamp_offset: int) -> Callable[[int, float, tuple[int, ...]], None]:
-    """Return what publishes the samples of one channel."""
-    axis, slope, offset = places[0]
-    before, behind = (0.0,) * axis, (0.0,) * (2 - axis)
+def _publisher(serialise: Callable[[int, float, float, float], bytes],
+               publish: Callable[[bytes], None], places: Sequence[_Place], channels: int,
+               stamp_offset: int) -> Callable[[int, float, tuple[int, ...]], None]:
+    """Return what publishes the samples of data frames: the hot path."""
+    (x, x_slope, x_offset), (y, y_slope, y_offset), (z, z_slope, z_offset) = places
     last = 0
 
     def publish_samples(stamp: int, period: float, values: tuple[int, ...]) -> None:
         nonlocal last
-        stamp += stamp_offset
-        for index, raw in enumerate(values):
-            last = max(last + 1, stamp + int(index * period))  # stamps never go backwards
-            publish(serialise(last, *before, slope * raw + offset, *behind))
-
-    return publish_samples
-
-
-def _several_channels(serialise: Serialise, publish: Publish,
-                      places: Sequence[tuple[int, float, float]],
-                      stamp_offset: int) -> Callable[[int, float, tuple[int, ...]], None]:
-    """Return what publishes the samples of several channels."""
-    count, last = len(places), 0
-    acceleration = [0.0, 0.0, 0.0]
-
-    def publish_samples(stamp: int, period: float, values: tuple[int, ...]) -> None:
-        nonlocal last
-        stamp += stamp_offset
-        for index in range(0, len(values), count):
-            for (axis, slope, offset), raw in zip(places, values[index:index + count],
-                                                  strict=True):
-                acceleration[axis] = slope * raw + offset
-            last = max(last + 1, stamp + int(index // count * period))
-            x, y, z = acceleration
-            publish(serialise(last, x, y, z))
+        stamp = max(stamp + stamp_offset, last + 1)  # stamps never go backwards
+        step = int(period)
+        for first in range(0, len(values), channels):
+            publish(serialise(stamp, x_slope * values[first + x] + x_offset,
+                              y_slope * values[first + y] + y_offset,
+                              z_slope * values[first + z] + z_offset))
+            last = stamp
+            stamp += step
 
     return publish_samples
 

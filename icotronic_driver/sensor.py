@@ -234,12 +234,15 @@ class Sensor(Device):
         range_text = f"the range of ±{self.options.acceleration_range:g} g"
         if self.options.calibration_source == "range":
             return by_range, range_text, ""
-        faults = []
-        for source, calibration in self._device_calibrations(axis):
+        own = self._device_calibrations(axis)
+        for source, calibration in own:
             if not calibration.fault:
                 return calibration, source, ""
-            faults.append(f"{source}: {calibration.fault}")
-        complaint = "no plausible calibration (" + "; ".join(faults or ["none stored"]) + ")"
+        faults = "; ".join(f"{source}: {calibration.fault}" for source, calibration in own)
+        complaint = f"no plausible calibration ({faults or 'none stored'})"
+        if self.options.calibration_source == "device" and own:
+            source, calibration = own[0]
+            return calibration, source, complaint
         return by_range, range_text, complaint
 
     def _device_calibrations(self, axis: str) -> list[tuple[str, Calibration]]:

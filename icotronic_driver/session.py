@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import math
 import re
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -35,10 +36,10 @@ from icotronic_driver.commands import (
 )
 from icotronic_driver.eeprom import STH_EEPROM, STU_EEPROM, Field, FieldValue, Status
 from icotronic_driver.identifier import STH_1, STU_1
-from icotronic_driver.line import Line
+from icotronic_driver.line import Line, StreamHandler
 from icotronic_driver.sensor import Options, Phase, Readings, SeenSensor, Sensor, UnitIdentity
 from icotronic_driver.settings import SETTINGS, nearest_adc_configuration
-from icotronic_driver.streaming import Calibration, StreamDecoder, supply_voltage
+from icotronic_driver.streaming import AXES, Calibration, StreamDecoder, supply_voltage
 
 T = TypeVar("T")
 
@@ -51,6 +52,7 @@ PATIENCE = 3.0  # s until a sensor that only advertises now and then must have b
 KEEP_ALIVE = 1.0  # s between checks of a connection without a stream
 SILENCE = 1.0  # s without a frame after which the stream is looked after
 DISCONNECT_TIMEOUT = 0.3  # s
+ON_THE_WAY = 0.05  # s without a frame after which none of a stopped stream will come
 
 
 class Listener:
@@ -101,7 +103,7 @@ class IcotronicBus:
         self._settled_since = 0.0
         self._searching_since = 0.0
         self._last_frame = 0.0
-        self._restarts = 0
+        self._told_rate = ""
         self._next_reading = 0.0
         self._readings = itertools.cycle(_READINGS)
 
@@ -189,7 +191,7 @@ class IcotronicBus:
     def reconnect(self) -> None:
         """Disconnect, and search again."""
         self._disconnect()
-        self._lose(NoAnswerError("reconnecting, as asked for"))
+        self._lose(DriverError("reconnecting, as asked for"))
         self.sensor.due = 0.0
 
     def reset(self, node: int) -> None:
@@ -197,7 +199,7 @@ class IcotronicBus:
         if node == STH_1:
             self._require()
         self.line.request(commands.RESET.request(node))
-        self._lose(NoAnswerError("reset, as asked for"))
+        self._lose(DriverError("reset, as asked for"))
 
     def execute(self, request: Request[T]) -> T:
         """Carry out any request; raises DriverError."""
@@ -240,22 +242,41 @@ class IcotronicBus:
         return changes
 
     def save(self) -> dict[Field, tuple[FieldValue, FieldValue]]:
-        """Write what differs into the EEPROM, read it back, and return what was changed."""
+        """Write what differs into the EEPROM, read it back, and return what was changed.
+
+        Raises:
+            DriverError: A field was not saved; the text says which, and which were before it.
+        """
         changes = self.unsaved()
+        saved: list[str] = []
         for field, (_, new) in changes.items():
-            self._write_field(field, new)
-            stored = self._read_field(STH_1, field)
-            if _raw(field, stored) != field.encode(new):
-                raise RefusedError(f"the EEPROM took {field.name} = {field.text(new)} but holds "
-                                   f"{field.text(stored)}; it may be locked")
+            try:
+                self._save_field(field, new)
+            except DriverError as error:
+                raise type(error)(f"{field.name} was not saved: {error} (saved before: "
+                                  f"{', '.join(saved) or 'nothing'})") from error
+            saved.append(field.name)
         self.sensor.unsaved -= set(_STORED)
         return changes
+
+    def _save_field(self, field: Field, value: FieldValue) -> None:
+        self._write_field(field, value)
+        stored = self._read_field(STH_1, field)
+        if _raw(field, stored) != field.encode(value):
+            raise RefusedError(f"the EEPROM took {field.text(value)} but holds "
+                               f"{field.text(stored)}; it may be locked")
 
     # --- searching and connecting (errata C4) ---
 
     def _search(self) -> None:
         """Look for the wanted sensor, and ask the stationary unit to connect it."""
-        self._look_around()
+        try:
+            self._give_up_old_connection()
+            self._look_around()
+        except DriverError:
+            self._searching_since = math.inf
+            raise
+        self._searching_since = min(self._searching_since, time.monotonic())
         target = self._choose()
         if target is None:
             return
@@ -263,6 +284,11 @@ class IcotronicBus:
         self.sensor.phase = Phase.CONNECTING
         self._connect_until = time.monotonic() + CONNECT_TIMEOUT
         self._connect_again = 0.0
+
+    def _give_up_old_connection(self) -> None:
+        """Release what a host that was killed, or a sensor that was reset, left connected."""
+        if self.line.request(commands.CHECK_CONNECTED.request(STU_1)):
+            self.line.request(commands.DEACTIVATE_BLUETOOTH.request(STU_1))
 
     def _look_around(self) -> None:
         """Ask the stationary unit which sensors are in range."""
@@ -369,7 +395,7 @@ class IcotronicBus:
 
     def _eeprom_calibrations(self) -> dict[str, Calibration]:
         calibrations = {}
-        for axis in self.sensor.options.channels:
+        for axis in AXES:
             pair = [self._read_field(STH_1, STH_EEPROM[f"Acceleration {axis.upper()}: {part}"])
                     for part in ("Slope", "Offset")]
             calibrations[axis] = Calibration(*map(float, pair))
@@ -384,11 +410,13 @@ class IcotronicBus:
             sensor.options.wanted |= {
                 "adc.prescaler": adc.prescaler, "adc.acquisition_time": adc.acquisition_time,
                 "adc.oversampling_rate": adc.oversampling_rate}
-            self._listener.on_note(
-                f"sample_rate {sensor.options.sample_rate:g}/s: nearest is "
-                f"{adc.sample_rate / sensor.format.channel_count:.6g}/s with prescaler "
-                f"{adc.prescaler}, acquisition time {adc.acquisition_time} and oversampling rate "
-                f"{adc.oversampling_rate}")
+            text = (f"sample_rate {sensor.options.sample_rate:g}/s: nearest is "
+                    f"{adc.sample_rate / sensor.format.channel_count:.6g}/s with prescaler "
+                    f"{adc.prescaler}, acquisition time {adc.acquisition_time} and oversampling "
+                    f"rate {adc.oversampling_rate}")
+            if text != self._told_rate:
+                self._listener.on_note(text)
+            self._told_rate = text
 
     def _write_wanted(self, changes: Mapping[str, Value]) -> object:
         return self.write(self.sensor, changes)
@@ -401,9 +429,14 @@ class IcotronicBus:
 
     def _serve(self) -> None:
         """Receive the stream, or check the connection; read something now and then."""
+        if self._wants_stream != (self.sensor.decoder is not None):
+            self._start_or_stop()  # it did not work when it was asked for
         if self.sensor.decoder is not None:
+            frames = self.sensor.decoder.statistics.frames
             self.line.listen(LISTEN_TIME)
-            if time.monotonic() - self._last_frame > SILENCE:
+            if self.sensor.decoder.statistics.frames != frames:
+                self._last_frame = time.monotonic()
+            elif time.monotonic() - self._last_frame > SILENCE:
                 self._look_after_stream()
         else:
             if not self.line.request(commands.CHECK_CONNECTED.request(STU_1)):
@@ -412,10 +445,14 @@ class IcotronicBus:
         if time.monotonic() >= self._next_reading:
             self._read_next()
 
+    @property
+    def _wants_stream(self) -> bool:
+        return self._active and self.sensor.enabled
+
     def _start_or_stop(self) -> None:
         if self.sensor.phase is not Phase.CONNECTED:
             return
-        if self._active and self.sensor.enabled:
+        if self._wants_stream:
             if self.sensor.decoder is None:
                 self._start()
         else:
@@ -431,20 +468,19 @@ class IcotronicBus:
         self._last_frame = time.monotonic()
         self.line.request(commands.START_ACCELERATION.request(STH_1, form))
 
-    def _stream_handler(self, sensor: Sensor) -> Callable[[bytearray, int], None]:
+    def _stream_handler(self, sensor: Sensor) -> StreamHandler:
         """Return what is done with each frame of the stream: the hot path."""
         decoder, clock = sensor.decoder, sensor.clock
         assert decoder is not None
         decode, data_sets, update = decoder.decode_frame, decoder.format.data_sets, clock.update
-        publish, monotonic = self._listener.on_stream(sensor), time.monotonic
+        publish = self._listener.on_stream(sensor)
         lost = 0
 
-        def handle(data: bytearray, now: int) -> None:
+        def handle(data: bytearray, bus_time: float, now: int) -> None:
             nonlocal lost
-            values = decode(now * 1e-9, data)
+            values = decode(bus_time, data)  # frames that waited for us were not late
             if values is None:
                 return
-            self._last_frame = monotonic()
             number = decoder.number * data_sets
             update(number + data_sets - 1, now)
             publish(clock.time_of(number), clock.period, values)
@@ -460,8 +496,16 @@ class IcotronicBus:
     def _stop(self) -> None:
         if self.sensor.decoder is not None:
             self.line.request(commands.STOP_ACCELERATION.request(STH_1))
+            self._take_what_is_on_the_way()
             self.line.on_stream = None
             self.sensor.end_stream()
+
+    def _take_what_is_on_the_way(self) -> None:
+        """Receive the last frames of a stopped stream, before the next one could get them."""
+        frames, end = -1, time.monotonic() + SILENCE
+        while frames != self.sensor.statistics.frames and time.monotonic() < end:
+            frames = self.sensor.statistics.frames
+            self.line.listen(ON_THE_WAY)
 
     @contextlib.contextmanager
     def _stopped_for(self, changes: Mapping[str, Value]) -> Iterator[None]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from typing import TypeVar
 
@@ -37,6 +38,7 @@ class Line:
         self.stale_frames = 0
         self._link: SerialLink | None = None
         self._unanswered: set[int] = set()  # addresses whose late replies may still come
+        self._names_due: Counter[int] = Counter()  # how many of those are device names
 
     def open(self, baud_rate: int) -> None:
         """Open the port; raises LinkError."""
@@ -111,21 +113,29 @@ class Line:
 
         Replies carry the function code alone, not what was asked for: after a time-out a late
         reply could pass for the answer to the next request. So that one is preceded by a request
-        for the device name, whose reply cannot be mistaken, and all before it is discarded.
+        for the device name, whose reply cannot be mistaken, and all before it is discarded. Where
+        several device names are due, only the last one is the proof.
         """
         address = request.destination
-        if address in self._unanswered and request.function_code != READ_DEVICE_NAME.function_code:
+        asks_name = request.function_code == READ_DEVICE_NAME.function_code
+        if address in self._unanswered and not asks_name:
             self._attempt(READ_DEVICE_NAME.request(address), lambda frame: None,
                           REPLY_TIMEOUT + timeout, ())
         self._discard_input()
+        self._names_due[address] += asks_name
         self.link.write(request.encode())
         unacceptable: FrameError | None = None
+        older_name: tuple[Frame, int] | None = None
         sent = self.link.seconds(len(request.pdu) + OVERHEAD)
         for frame, stamp in self._frames(timeout + sent):
             if frame == request:
                 continue  # the line's echo of ourselves
+            self._note_name(frame)
             if not _answers(frame, request, sources or (address,)):
                 self.stale_frames += 1
+                continue
+            if asks_name and self._names_due[address]:
+                older_name = frame, stamp
                 continue
             self._unanswered.discard(address)
             if frame.function_code == FAILURE:
@@ -136,6 +146,10 @@ class Line:
                 return decode(frame), stamp
             except FrameError as error:
                 unacceptable = error
+        if older_name is not None:  # the others were lost
+            self._names_due[address] = 0
+            self._unanswered.discard(address)
+            return decode(older_name[0]), older_name[1]
         self._unanswered.add(address)
         raise unacceptable or NoAnswerError(f"address {address} does not answer on {self.port} "
                                             f"at {self.link.baud_rate} Bd")
@@ -163,10 +177,18 @@ class Line:
 
     def _discard_input(self) -> None:
         """Drop what arrived unasked, so that it cannot pass for a reply."""
-        self.stale_frames += sum(1 for _ in self.parser.feed(self.link.read(0)))
-        self.stale_frames += sum(1 for _ in self.parser.flush())
+        for frame in (*self.parser.feed(self.link.read(0)), *self.parser.flush()):
+            self._note_name(frame)
+            self.stale_frames += 1
+
+    def _note_name(self, frame: Frame) -> None:
+        if frame.function_code == READ_DEVICE_NAME.function_code and frame.destination == MASTER:
+            self._names_due[frame.source] = max(0, self._names_due[frame.source] - 1)
 
 
 def _answers(frame: Frame, request: Frame, sources: tuple[int, ...]) -> bool:
-    return (frame.destination == MASTER and frame.source in sources
-            and frame.function_code in (request.function_code, FAILURE))
+    if frame.destination != MASTER or frame.source not in sources:
+        return False
+    if request.function_code == READ_DEVICE_NAME.function_code:  # which no device refuses
+        return frame.function_code == request.function_code
+    return frame.function_code in (request.function_code, FAILURE)

@@ -190,8 +190,10 @@ class IsysRadarNode(DeviceNode, Listener):
 
     def on_note(self, radar: Radar, text: str, *, warning: bool = False) -> None:
         """Log a line."""
-        logger = self.get_logger()
-        (logger.warning if warning else logger.info)(f"{self._title(radar)}: {text}")
+        if warning:  # rclpy takes one severity per line of code only
+            self.get_logger().warning(f"{self._title(radar)}: {text}")
+        else:
+            self.get_logger().info(f"{self._title(radar)}: {text}")
 
     def on_target_list(self, radar: Radar, targets: TargetList, stamp: int) -> None:
         """Publish the targets as points."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections import deque
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from isys_radar_driver.models import FAST, Model
 from isys_radar_driver.targets import Resolution
 
 RATE_WINDOW = 5.0  # s over which the rate is measured
+EARLY = 0.25  # cycles by which a list may come before it is expected
 
 
 @dataclass(frozen=True)
@@ -94,8 +96,10 @@ class Radar(Device):
         self.measuring = False
         self.statistics = Statistics()
         self.arrivals: deque[float] = deque()
+        self._cycle_end = 0.0  # when the cycle of the last arrival ended, as far as known
         self.misses = 0
         self.fixed_targets = 0  # learned length of fixed-length lists
+        self.checks = 0  # how often it was checked for a reset
 
     @property
     def name(self) -> str:
@@ -165,9 +169,12 @@ class Radar(Device):
         """Count a target list, and the cycles that passed without one."""
         self.statistics.target_lists += 1
         self.statistics.clippings += clipping
+        expected = now
         if self.arrivals:
-            cycles = round((now - self.arrivals[-1]) / self.cycle_time)
-            self.statistics.lost_cycles += max(0, cycles - 1)
+            cycles = max(1, math.floor((now - self._cycle_end) / self.cycle_time + EARLY))
+            self.statistics.lost_cycles += cycles - 1
+            expected = self._cycle_end + cycles * self.cycle_time
+        self._cycle_end = min(now, (expected + now) / 2)  # lists come late, never early
         self.arrivals.append(now)
         while now - self.arrivals[0] > RATE_WINDOW:
             self.arrivals.popleft()

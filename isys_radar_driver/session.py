@@ -164,21 +164,20 @@ class RadarBus:
             DriverError: Not connected, a bad value, a refusal or no answer.
         """
         self._require(radar)
-        with self._stopped_for(radar, changes):
-            return radar.write(_Access(self, radar), changes)
+        try:
+            return self._write(radar, changes)
+        except (NoAnswerError, FrameError) as error:  # so what it holds now is not known
+            self._lose(radar, error)
+            raise
 
     def execute(self, radar: Radar, command: Command[T]) -> T:
         """Carry out a command that the model has; raises DriverError."""
-        model = self._require(radar)
-        if not model.supports(command):
-            raise SettingError(f"{model.name} cannot {command.name}")
+        self._require_support(radar, command)
         return self._execute(radar, command)
 
     def read_raw_signals(self, radar: Radar) -> RawSignals:
         """Read the raw signals of one measurement; needs the acquisition to run."""
-        model = self._require(radar)
-        if not model.supports(commands.READ_RAW):
-            raise SettingError(f"{model.name} cannot {commands.READ_RAW.name}")
+        self._require_support(radar, commands.READ_RAW)
         if not radar.measuring:
             raise SettingError("raw signals need the acquisition to run; start it first")
         radar.arrivals.clear()  # the cycle is expanded on purpose (section 3.3.10)
@@ -205,11 +204,13 @@ class RadarBus:
 
     def restore_factory_settings(self, radar: Radar) -> None:
         """Restore the factory settings, and read everything again."""
-        model = self._require(radar)
+        command = commands.RESTORE_FACTORY_SETTINGS
+        model = self._require_support(radar, command)
         measuring = radar.measuring
         self._stop(radar)
         try:
-            self.execute(radar, commands.RESTORE_FACTORY_SETTINGS)
+            self._exchange(radar, command.request(radar.address), _acknowledged, EEPROM_TIMEOUT,
+                           sources=(radar.address, model.address))
             radar.options.wanted.clear()
             radar.differing.clear()
             radar.unsaved.clear()
@@ -217,6 +218,7 @@ class RadarBus:
                 self._execute(radar, commands.READ_DEVICE_NAME)
             except NoAnswerError:  # the address may have been restored as well
                 radar.address = model.address
+                radar.options.address = radar.options.address and model.address
             self._read_all(radar)
         finally:
             radar.measuring = measuring
@@ -236,9 +238,15 @@ class RadarBus:
                                f"allowed is {FIRST_ADDRESS} … {LAST_ADDRESS}")
         if any(other is not radar and other.address == address for other in self.devices):
             raise SettingError(f"address {address} belongs to another radar of this driver")
+        if address != radar.address and self._answers_at(radar, address):
+            raise SettingError(f"address {address} belongs to another device on the line")
         request = commands.change_address(radar.address, address)
-        self._exchange(radar, request, lambda frame: None, REPLY_TIMEOUT + EEPROM_TIMEOUT,
-                       sources=(address, radar.address))
+        try:
+            self._exchange(radar, request, lambda frame: None, REPLY_TIMEOUT + EEPROM_TIMEOUT,
+                           sources=(address, radar.address))
+        except NoAnswerError:  # of the request, or only of its acknowledge
+            if not self._answers_at(radar, address):
+                raise
         radar.address = address
         radar.options.address = address
 
@@ -256,7 +264,7 @@ class RadarBus:
                 self._keep_alive(radar)
             radar.misses = 0
         except RefusedError as error:
-            self._configure_again(radar, error)
+            self._configure_again(radar, str(error))
         except (NoAnswerError, FrameError) as error:
             radar.statistics.timeouts += 1
             radar.misses += 1
@@ -324,12 +332,13 @@ class RadarBus:
         radar.statistics.connections += 1
         self._listener.on_found(radar)
 
-    def _configure_again(self, radar: Radar, refusal: RefusedError) -> None:
-        """React to a radar that refuses to measure: it may have been reset without notice."""
-        self._listener.on_note(radar, f"{refusal}; configuring it again", warning=True)
+    def _configure_again(self, radar: Radar, reason: str) -> None:
+        """React to a radar that seems to have been reset without notice."""
+        self._listener.on_note(radar, f"{reason}; configuring it again", warning=True)
         try:
             self._configure(radar)
-            if radar.measuring:
+            self._listener.on_values(radar)
+            if radar.measuring and self._require(radar).has_target_lists:
                 self._measure(radar)
         except LinkError:
             raise
@@ -341,8 +350,12 @@ class RadarBus:
         assert radar.identity is not None
         self._read_all(radar)
         radar.measuring = True  # unknown: it may have been left running
-        radar.make_as_wanted(lambda changes: self.write(radar, changes), self._note_of(radar))
+        radar.make_as_wanted(lambda changes: self._write(radar, changes), self._note_of(radar))
         self._start_or_stop(radar)
+
+    def _write(self, radar: Radar, changes: Mapping[str, Value]) -> dict[str, Value]:
+        with self._stopped_for(radar, changes):
+            return radar.write(_Access(self, radar), changes)
 
     def _start_or_stop(self, radar: Radar) -> None:
         wanted = self._active and radar.enabled
@@ -398,18 +411,33 @@ class RadarBus:
             self._listener.on_digital_outputs(radar, outputs, stamp)
 
     def _keep_alive(self, radar: Radar) -> None:
-        """Check that a radar which is not measuring is there; read what it has to tell."""
+        """Check that a radar without target lists is there and as it was; read temperatures."""
         assert radar.identity is not None
         radar.due = time.monotonic() + KEEP_ALIVE
-        temperatures = {"dsp": commands.READ_DSP_TEMPERATURE, "rfe": commands.READ_RFE_TEMPERATURE}
-        model = radar.identity.model
-        if not model.supports(commands.READ_DSP_TEMPERATURE):
-            self._execute(radar, commands.READ_ADDRESS)
+        self._execute(radar, commands.READ_ADDRESS)
+        self._check_reset(radar)
+        if radar.identity is None or not radar.identity.model.supports(
+                commands.READ_DSP_TEMPERATURE):
             return
+        temperatures = {"dsp": commands.READ_DSP_TEMPERATURE, "rfe": commands.READ_RFE_TEMPERATURE}
         stamp = 0
         for name, command in temperatures.items():
-            radar.temperatures[name], stamp = self._timed(radar, command)
+            with contextlib.suppress(RefusedError):  # this one lacks it
+                radar.temperatures[name], stamp = self._timed(radar, command)
         self._listener.on_temperatures(radar, stamp)
+
+    def _check_reset(self, radar: Radar) -> None:
+        """Configure a radar again that lost a setting which is not in its EEPROM."""
+        if not radar.unsaved:
+            return
+        names = sorted(radar.unsaved)
+        radar.checks += 1
+        name = names[radar.checks % len(names)]
+        setting = radar.settings[name]
+        reported = read_settings(_Access(self, radar), [setting])[name]
+        if reported != radar.values[name]:
+            self._configure_again(radar, f"{name} is {setting.text(reported)}, it was "
+                                         f"{setting.text(radar.values[name])}")
 
     # --- requests ---
 
@@ -428,6 +456,12 @@ class RadarBus:
                 f"{radar.name} is not connected: {reason or 'still searching'}")
         return radar.identity.model
 
+    def _require_support(self, radar: Radar, command: Command[T]) -> Model:
+        model = self._require(radar)
+        if not model.supports(command):
+            raise SettingError(f"{model.name} cannot {command.name}")
+        return model
+
     def _baud_candidates(self, radar: Radar) -> tuple[int, ...]:
         if self._baud_rate:
             return (self._baud_rate,)
@@ -436,6 +470,14 @@ class RadarBus:
         if radar.options.model is not None:
             return (radar.options.model.baud_rate,)
         return BAUD_RATES
+
+    def _answers_at(self, radar: Radar, address: int) -> bool:
+        try:
+            self._exchange(radar, commands.READ_DEVICE_NAME.request(address), lambda frame: None,
+                           REPLY_TIMEOUT)
+        except NoAnswerError:
+            return False
+        return True
 
     def _ask_address(self, radar: Radar) -> int:
         """Ask for the address by broadcast; one sensor on the line may answer (3.3.4.1)."""

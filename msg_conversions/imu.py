@@ -1,7 +1,7 @@
 """Accelerations as sensor_msgs/Imu, serialised at thousands of messages a second.
 
-Building and serialising a message object costs several times what publishing its bytes does. A
-stream changes stamp and acceleration only, so one serialised message is made and these are patched.
+Building and serialising a message object costs several times what publishing its bytes does. In a
+stream only stamp and acceleration change, so one message is serialised, and these are replaced.
 """
 
 from __future__ import annotations
@@ -18,10 +18,8 @@ NOT_MEASURED = -1.0  # first element of a covariance (sensor_msgs/Imu)
 UNKNOWN_VARIANCE = 1e6  # m²/s⁴, of an axis that is not measured
 NANOSECONDS = 1_000_000_000
 
-_STAMP_OFFSET = 4  # behind the header of the encapsulation
-_COVARIANCE_SIZE = 9 * 8
-_put_stamp = struct.Struct("<iI").pack_into
-_put_acceleration = struct.Struct("<ddd").pack_into
+_STAMP = slice(4, 12)  # behind the header of the encapsulation
+_ACCELERATION = slice(-12 * 8, -9 * 8)  # in front of its covariance, which is the end
 
 
 def to_imu(acceleration: Sequence[float], variances: Sequence[float], frame_id: str,
@@ -48,12 +46,15 @@ class ImuTemplate:
 
     def __init__(self, variances: Sequence[float], frame_id: str) -> None:
         """Serialise the message once; see `to_imu` for the arguments."""
-        self._buffer = bytearray(serialize_message(to_imu((0.0, 0.0, 0.0), variances, frame_id, 0)))
-        self._offset = len(self._buffer) - _COVARIANCE_SIZE - 3 * 8
+        message = serialize_message(to_imu((0.0, 0.0, 0.0), variances, frame_id, 0))
+        self._head = message[:_STAMP.start]
+        self._middle = message[_STAMP.stop:_ACCELERATION.start]
+        self._tail = message[_ACCELERATION.stop:]
+        self._pack = struct.Struct(
+            f"<{len(self._head)}siI{len(self._middle)}sddd{len(self._tail)}s").pack
 
     def serialised(self, stamp: int, x: float, y: float, z: float) -> bytes:
         """Return the serialised message with this stamp in ns and this acceleration in m/s²."""
         seconds = stamp // NANOSECONDS
-        _put_stamp(self._buffer, _STAMP_OFFSET, seconds, stamp - seconds * NANOSECONDS)
-        _put_acceleration(self._buffer, self._offset, x, y, z)
-        return bytes(self._buffer)
+        return self._pack(self._head, seconds, stamp - seconds * NANOSECONDS, self._middle,
+                          x, y, z, self._tail)

@@ -1,0 +1,252 @@
+"""Nodes as processes of their own, and a ROS node in the test that talks to them.
+
+    with Ros() as ros, NodeProcess("isys_radar_driver.node", {"serial_port": port}) as process:
+        radar = ros.remote("/isys_radar")
+        points = radar.subscribe(PointCloud2, "points")
+        ros.wait_until(lambda: points)
+        assert radar.set("output1.range_max", 20.0).successful
+        process.stop()
+
+Nothing sleeps for a fixed time: whoever waits does so until something happens, at most `DEADLINE`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from typing import NamedTuple
+
+import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from lifecycle_msgs.srv import ChangeState, GetState
+from rcl_interfaces.srv import (
+    DescribeParameters,
+    GetParameters,
+    ListParameters,
+    SetParameters,
+    SetParametersAtomically,
+)
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.qos import QoSProfile
+from rclpy.signals import SignalHandlerOptions
+from std_srvs.srv import Trigger
+
+DEADLINE = 15.0  # s; far more than anything takes, also on a busy machine
+TRANSITIONS = {"configure": 1, "cleanup": 2, "activate": 3, "deactivate": 4}
+
+
+class NodeProcess:
+    """A node that runs as its user would run it; all it prints is collected.
+
+    Args:
+        module: Module whose `main` runs the node.
+        parameters: Values for `-p`.
+        arguments: More ROS arguments, for example "-r", "__ns:=/left".
+    """
+
+    def __init__(self, module, parameters=None, *arguments):
+        for name, value in (parameters or {}).items():
+            arguments += "-p", f"{name}:={json.dumps(value)}"
+        self.lines = []
+        self._news = threading.Condition()
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", f"from {module} import main; main()", "--ros-args", *arguments],
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            env={**os.environ, "PYTHONUNBUFFERED": "1"})
+        self._reader = threading.Thread(target=self._read)
+        self._reader.start()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self._process.kill()
+        self._process.wait()
+        self._reader.join()
+        self._process.stdout.close()
+
+    def _read(self):
+        for line in self._process.stdout:
+            with self._news:
+                self.lines.append(line.rstrip("\n"))
+                self._news.notify_all()
+
+    @property
+    def log(self):
+        """All that was printed until now."""
+        return "\n".join(self.lines)
+
+    def wait_for_line(self, text, start=0):
+        """Return the first line with this text, from line number `start` on."""
+        with self._news:
+            if not self._news.wait_for(lambda: text in "\n".join(self.lines[start:]), DEADLINE):
+                pytest.fail(f"{text!r} was not printed:\n{self.log}")
+            return next(line for line in self.lines[start:] if text in line)
+
+    def wait(self):
+        """Return the exit code once the node has ended by itself."""
+        try:
+            code = self._process.wait(DEADLINE)
+        except subprocess.TimeoutExpired:
+            pytest.fail(f"the node does not end:\n{self.log}")
+        self._reader.join()
+        return code
+
+    def stop(self, number=signal.SIGINT):
+        """Send a signal; the node ends well and tells of no error in its code."""
+        self._process.send_signal(number)
+        assert self.wait() == 0, self.log
+        assert "Traceback" not in self.log, self.log
+        assert "internal error" not in self.log, self.log
+
+
+class Status(NamedTuple):
+    """One status of the diagnostics, its values as a dictionary."""
+
+    level: int
+    message: str
+    hardware_id: str
+    values: dict[str, str]
+
+
+class Ros:
+    """A ROS node in the test; it does something only while the test waits."""
+
+    def __init__(self):
+        self._context = Context()
+        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
+        self.node = rclpy.create_node("test", context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        self._clients = {}
+        self._subscriptions = []
+        self._statuses = None
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self._executor.shutdown()
+        self.node.destroy_node()
+        rclpy.try_shutdown(context=self._context)
+
+    def wait_until(self, condition):
+        """Return what the condition gives, once that is true."""
+        deadline = time.monotonic() + DEADLINE
+        while not (result := condition()):
+            assert time.monotonic() < deadline, "it does not happen"
+            self._executor.spin_once(timeout_sec=0.05)
+        return result
+
+    def subscribe(self, kind, topic, depth=1000):
+        """Return a list which receives every message from now on."""
+        messages = []
+        self._subscriptions.append(self.node.create_subscription(
+            kind, topic, messages.append, QoSProfile(depth=depth)))
+        return messages
+
+    def forget(self):
+        """End all subscriptions, so that they do not take time in the next test."""
+        for subscription in self._subscriptions:
+            self.node.destroy_subscription(subscription)
+        self._subscriptions.clear()
+        self._statuses = None
+
+    def call(self, kind, name, request=None):
+        """Call a service and return its response."""
+        if name not in self._clients:
+            self._clients[name] = self.node.create_client(kind, name)
+        client = self._clients[name]
+        self.wait_until(client.service_is_ready)
+        future = client.call_async(request or kind.Request())
+        self.wait_until(future.done)
+        return future.result()
+
+    def has_service(self, name):
+        """Return whether somebody offers a service."""
+        return name in dict(self.node.get_service_names_and_types())
+
+    def wait_for_status(self, name, condition=lambda status: True):
+        """Return the first diagnostics from now on with this name and the condition."""
+        if self._statuses is None:
+            self._statuses = self.subscribe(DiagnosticArray, "/diagnostics")
+        self._statuses.clear()
+
+        def wanted():
+            for array in self._statuses:
+                for raw in array.status:
+                    status = Status(ord(raw.level), raw.message, raw.hardware_id,
+                                    {pair.key: pair.value for pair in raw.values})
+                    if raw.name == name and condition(status):
+                        return status
+            return None
+
+        return self.wait_until(wanted)
+
+    def remote(self, name):
+        """Return a handle of another node."""
+        return RemoteNode(self, name)
+
+
+class RemoteNode:
+    """Another node: its parameters, topics, services and states."""
+
+    def __init__(self, ros, name):
+        self.ros = ros
+        self.name = name
+
+    def subscribe(self, kind, topic):
+        """Return a list which receives every message of a topic of the node."""
+        return self.ros.subscribe(kind, f"{self.name}/{topic}")
+
+    def names(self):
+        """Return the names of all parameters."""
+        return set(self._call(ListParameters, "list_parameters").result.names)
+
+    def get(self, *names):
+        """Return the value of a parameter, or a list of several."""
+        values = [parameter_value_to_python(value) for value in self._call(
+            GetParameters, "get_parameters", names=list(names)).values]
+        return values if len(names) > 1 else values[0]
+
+    def describe(self, *names):
+        """Return the descriptor of a parameter, or a list of several."""
+        descriptors = self._call(
+            DescribeParameters, "describe_parameters", names=list(names)).descriptors
+        return descriptors if len(names) > 1 else descriptors[0]
+
+    def set(self, name, value):
+        """Set a parameter and return the result."""
+        return self._call(SetParameters, "set_parameters", parameters=[
+            Parameter(name, value=value).to_parameter_msg()]).results[0]
+
+    def set_atomically(self, values):
+        """Set all parameters or none, and return the result."""
+        return self._call(SetParametersAtomically, "set_parameters_atomically", parameters=[
+            Parameter(name, value=value).to_parameter_msg() for name, value in values.items()
+        ]).result
+
+    def trigger(self, service):
+        """Call a service without arguments and return its response."""
+        return self._call(Trigger, service)
+
+    def state(self):
+        """Return the name of the node's state."""
+        return self._call(GetState, "get_state").current_state.label
+
+    def change_state(self, transition):
+        """Carry out a transition and return whether it succeeded."""
+        request = ChangeState.Request()
+        request.transition.id = TRANSITIONS[transition]
+        return self.ros.call(ChangeState, f"{self.name}/change_state", request).success
+
+    def _call(self, kind, service, **fields):
+        return self.ros.call(kind, f"{self.name}/{service}", kind.Request(**fields))
