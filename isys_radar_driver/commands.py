@@ -6,9 +6,10 @@ import struct
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass
 from enum import IntEnum
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from driver_common.errors import FrameError, SettingError
 from driver_common.settings import Raw, Record
@@ -83,7 +84,7 @@ class RawSignals:
     """
 
     sample_time: float
-    samples: np.ndarray
+    samples: npt.NDArray[Any]
 
 
 def _exactly(pdu: bytes, form: str) -> tuple[int, ...]:
