@@ -7,6 +7,8 @@ inside.
 
 from __future__ import annotations
 
+import ast
+import inspect
 import math
 import struct
 from collections.abc import Callable, Mapping, Sequence
@@ -15,7 +17,7 @@ from enum import IntEnum
 from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
 
 from driver_common.errors import FrameError, RefusedError, SettingError
-from driver_common.settings import Raw, Record
+from driver_common.settings import Raw, Record, suggestion
 from icotronic_driver.identifier import SPU_1, STH_1, Frame, Identifier, node_name
 from icotronic_driver.streaming import STOP, StreamFormat, decode_single
 
@@ -803,10 +805,29 @@ def _signal(data: bytes) -> Signal:
 TEST_SIGNAL = Command("give a test signal", TEST, 0x01, _test_signal, _signal, mask=b"\xff",
                       section="10.8.1")
 
-COMMANDS: tuple[Command[..., Any], ...] = tuple(
-    command for value in list(globals().values())
-    for command in (value if isinstance(value, tuple) else (value,))
-    if isinstance(command, Command))
+COMMANDS: Mapping[str, Command[..., Any]] = {
+    name.strip("_").lower() + (f"_{index + 1}" if isinstance(value, tuple) else ""): command
+    for name, value in list(globals().items())
+    for index, command in enumerate(value if isinstance(value, tuple) else (value,))
+    if isinstance(command, Command)}
+
+
+def parse_request(text: str, receiver: int) -> Request[Any]:
+    """Return the request that a line such as "test_signal 1" or "read_state" asks for.
+
+    Raises:
+        SettingError: There is no such command, or its arguments do not fit.
+    """
+    name, *words = text.split() or [""]
+    command = COMMANDS.get(name)
+    if command is None:
+        raise SettingError(f'there is no command "{name}"{suggestion(name, COMMANDS)}')
+    try:
+        return command.request(receiver, *map(ast.literal_eval, words))
+    except (AttributeError, TypeError, ValueError, SyntaxError, struct.error) as error:
+        takes = inspect.signature(command.encode)
+        raise SettingError(f"{name} takes {takes}, not {' '.join(words) or 'nothing'}: "
+                           f"{error}") from None
 
 
 # --- blocks of settings ---

@@ -61,7 +61,7 @@ def test_messages(example: Example) -> None:
 
 def test_every_command_has_an_example() -> None:
     shown = {(each.request_id >> 12, request_of(each).name) for each in EXAMPLES}
-    for command in COMMANDS:
+    for command in COMMANDS.values():
         assert (command.block << 10 | command.block_command << 2 | 2, command.name) in shown
     assert {each.request_id >> 22 for each in EXAMPLES} == {0x00, 0x04, 0x08, 0x28, 0x3D, 0x3E,
                                                             0x3F}
