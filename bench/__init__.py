@@ -1,0 +1,1 @@
+"""How fast the ICOtronic driver is beside others: `./dev bench`, see docs/performance.md."""

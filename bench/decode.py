@@ -1,0 +1,74 @@
+"""Decoding only: CPU time per frame of the session and of the package icotronic."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from bench.measure import Cost, Process, Row, in_turn
+
+NAME, UNIT, AIM = "decode", "µs CPU per frame", 0.4
+CONFIGURATION = """\
+dynaconf_merge: true
+can:
+  linux:
+    interface: socketcand
+    channel: can0
+"""
+
+
+def compare(core: int | None, frames: int, rounds: int) -> Row:
+    """Return the row.
+
+    Args:
+        core: Where the measured processes run.
+        frames: Frames that each run decodes.
+        rounds: How often.
+    """
+    if importlib.util.find_spec("icotronic") is None:
+        return Row.not_measured(NAME, UNIT, AIM, "the package icotronic is not installed"
+                                + "; it needs Python 3.12" * (sys.version_info < (3, 12)))
+    skipped = frames // 2  # in these, a first reading of the sensor's state gets its answer
+    with tempfile.TemporaryDirectory() as directory:
+        home = Path(directory)
+        (home / ".config" / "ICOtronic").mkdir(parents=True)
+        (home / ".config" / "ICOtronic" / "config.yaml").write_text(CONFIGURATION)
+
+        def ours() -> Cost:
+            with _flood() as port:
+                return _decode("bench.decode_ours", port, skipped, skipped + frames, core=core)
+
+        def vendor() -> Cost:
+            with _flood() as port:
+                return _decode("bench.decode_vendor", skipped, skipped + frames, core=core,
+                               environment={
+                                   "HOME": str(home), "XDG_CONFIG_HOME": str(home / ".config"),
+                                   "CAN_CONFIG": json.dumps({"host": "127.0.0.1", "port": port})})
+
+        results = list(in_turn({"ours": ours, "other": vendor}, rounds))
+    return Row.of_costs(NAME, UNIT, AIM, [result["ours"] for result in results],
+                        [result["other"] for result in results])
+
+
+@contextmanager
+def _flood() -> Iterator[int]:
+    """Serve frames without end; yield the port."""
+    with Process("bench.server", "--rate", 1e6) as server:
+        server.tell("find")
+        yield int(server.line())
+
+
+def _decode(module: str, *arguments: object, core: int | None,
+            environment: dict[str, str] | None = None) -> Cost:
+    with Process(module, *arguments, core=core, environment=environment) as client:
+        seconds, frames, lost = client.line().split()
+        if int(lost):
+            raise client.failure(f"lost {lost} frames")
+        return Cost(float(seconds) / int(frames) * 1e6, int(frames))
+
+

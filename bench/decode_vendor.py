@@ -1,0 +1,36 @@
+"""The stream reader of the package icotronic, reading a flood; prints CPU time in s and frames.
+
+The package has no option for host and port of the server: python-can takes them from CAN_CONFIG.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import sys
+import time
+
+from icotronic.can.connection import Connection
+from icotronic.can.streaming import StreamingConfiguration
+
+
+async def main() -> None:
+    """Read the frames."""
+    logging.getLogger("can").setLevel(logging.CRITICAL)  # else it warns per piece that it reads
+    first, last = map(int, sys.argv[1:])
+    count = missing = 0
+    async with (Connection() as stu, stu.connect_sensor_node("Bench") as node,
+                node.open_data_stream(StreamingConfiguration(first=True)) as stream):
+        async for _, lost in stream:
+            count += 1
+            missing += lost
+            if count == first:
+                start = time.process_time()
+            elif count == last:
+                print(time.process_time() - start, last - first, missing, flush=True)
+                os._exit(0)  # the flood would go on
+
+
+if __name__ == "__main__":
+    asyncio.run(main())
