@@ -9,8 +9,8 @@ from typing import Any
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticStatus
+from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.exceptions import InvalidParameterValueException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter as RosParameter
@@ -69,6 +69,7 @@ class DeviceNode(LifecycleNode):
         self._entities: list[Callable[[], object]] = []
         self._declare_options()
         self.create_timer(diagnostics.PERIOD, self._publish_diagnostics)
+        self._refuse_impossible_transitions()
 
     # --- what a driver provides ---
 
@@ -86,6 +87,9 @@ class DeviceNode(LifecycleNode):
     def status_of(self, device: Any) -> DiagnosticStatus:
         """Return the diagnostics of a device."""
         raise NotImplementedError
+
+    def check_option(self, name: str, value: Value) -> None:
+        """Refuse a live option that the devices cannot carry out; raises SettingError."""
 
     def apply_options(self) -> None:
         """Hand live options to the bus after a change."""
@@ -166,12 +170,14 @@ class DeviceNode(LifecycleNode):
 
     def show_settings(self, sensor: str, device: Any) -> None:
         """Declare a device's settings with the values that it reported; from any thread."""
-        settings, values = dict(device.settings), dict(device.values)
-        self._later(lambda: self._show_settings(sensor, device, settings, values))
+        self._later(lambda: self._show_settings(sensor, device))
 
-    def _show_settings(self, sensor: str, device: Any, settings: Mapping[str, Setting],
-                       values: Mapping[str, Value]) -> None:
-        if self.bus is None:
+    def _show_settings(self, sensor: str, device: Any) -> None:
+        if self.bus is None or device not in self.bus.devices:
+            return
+        # As they are now, because a set may have come since; between two steps of the bus.
+        settings, values = self.call(lambda: (dict(device.settings), dict(device.values)))
+        if settings.keys() != values.keys():  # the device was lost while it was read
             return
         prefix = self.prefix(sensor)
         gone = [name for name, owner in self._devices.items()
@@ -196,6 +202,10 @@ class DeviceNode(LifecycleNode):
         if not own:
             return super().set_parameters_atomically(parameter_list)
         try:
+            if len(own) < len(parameter_list):
+                raise SettingError("set the parameters of ROS, such as use_sim_time, separately")
+            for parameter in own:
+                self._check_is_there(parameter.name)
             return self.store.store(self._apply(self.store.check(own)))
         except DriverError as error:
             return refusal(error)
@@ -214,6 +224,7 @@ class DeviceNode(LifecycleNode):
                 by_device.setdefault(self._devices[name], {})[name] = value
             else:
                 self._check_may_change(name, value)
+                self.check_option(name, value)
         result = dict(values)
         done: list[tuple[Any, dict[str, Value]]] = []
         try:
@@ -235,6 +246,19 @@ class DeviceNode(LifecycleNode):
             device, {name.removeprefix(prefix): value for name, value in changes.items()}))
         return {prefix + name: value for name, value in reported.items()}
 
+    def _check_is_there(self, name: str) -> None:
+        """Say why a device's setting is no parameter now; raises SettingError."""
+        for sensor in self.sensors:
+            known = [self.prefix(sensor) + setting for setting in self.ALL_SETTINGS]
+            if name in self.store.rows or name not in known:
+                continue
+            reason = self._bus_error or (self._unconfigured() if self.bus is None else None)
+            for device in self.bus.devices if self.bus is not None else ():
+                if device.options.name == sensor and reason is None:
+                    reason = (f"the {device.product} has no such setting" if device.settings
+                              else device.error or "still searching the device")
+            raise SettingError(f"{name} cannot be set: {reason}")
+
     def _check_may_change(self, name: str, value: Value) -> None:
         option = self.store.rows[name]
         if (isinstance(option, Option) and not option.live and self.bus is not None
@@ -249,14 +273,26 @@ class DeviceNode(LifecycleNode):
     def call(self, job: Callable[[], Any]) -> Any:
         """Run a job in the thread of the bus; raises DriverError."""
         if self.thread is None:
-            raise DriverError("the node is not configured; run 'ros2 lifecycle set "
-                              f"{self.get_fully_qualified_name()} configure'")
+            raise DriverError(self._unconfigured())
         return self.thread.call(job)
+
+    def _unconfigured(self) -> str:
+        return ("the node is not configured; run 'ros2 lifecycle set "
+                f"{self.get_fully_qualified_name()} configure'")
 
     def _later(self, job: Callable[[], object]) -> None:
         """Run a job in the executor, where parameters may be touched."""
+        def guarded() -> None:
+            try:
+                job()
+            except DriverError as error:
+                if self.bus is not None:
+                    self.get_logger().error(str(error))
+            except Exception as error:  # an exception here would end the node
+                self.get_logger().error(f"internal error, please report it: {error!r}")
+
         if self.executor is not None:
-            self.executor.create_task(job)
+            self.executor.create_task(guarded)
 
     def on_bus_state(self, error: DriverError | None) -> None:
         """Take note that the link opened or failed; one line in the log per change."""
@@ -271,10 +307,20 @@ class DeviceNode(LifecycleNode):
     # --- interfaces ---
 
     def add_publisher(self, kind: Any, sensor: str, name: str, depth: int = 10) -> Any:
-        """Create a reliable publisher whose QoS can be overridden; gone at clean-up."""
-        publisher = self.create_publisher(
-            kind, self.topic(sensor, name), depth,
-            qos_overriding_options=QoSOverridingOptions.with_default_policies())
+        """Create a reliable publisher whose QoS can be overridden; gone at clean-up.
+
+        Raises:
+            SettingError: An override is not acceptable.
+        """
+        topic = self.topic(sensor, name)
+        try:
+            publisher = self.create_publisher(
+                kind, topic, depth,
+                qos_overriding_options=QoSOverridingOptions.with_default_policies())
+        except Exception as error:  # rclpy has many for this
+            topic = self.resolve_topic_name(topic)
+            raise SettingError(f"cannot publish {topic}, check its parameters qos_overrides."
+                               f"{topic}.publisher.*: {error or 'a wrong type'}") from error
         self._entities.append(lambda: self.destroy_publisher(publisher))
         return publisher
 
@@ -321,13 +367,28 @@ class DeviceNode(LifecycleNode):
 
     # --- lifecycle ---
 
+    def _refuse_impossible_transitions(self) -> None:
+        """Answer a transition that is not possible now with a failure; rclpy ends the node."""
+        change_state = self._service_change_state.callback
+
+        def handle(request: ChangeState.Request,
+                   response: ChangeState.Response) -> ChangeState.Response:
+            try:
+                return change_state(request, response)
+            except RuntimeError as error:
+                self.get_logger().warning(f"no such transition in the present state: {error}")
+                response.success = False
+                return response
+
+        self._service_change_state.callback = handle
+
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Open the bus in its own thread, which waits for the devices."""
         try:
             bus = self.make_bus()
             for sensor in self.sensors:
                 self.make_interfaces(sensor)
-        except (DriverError, InvalidParameterValueException) as error:
+        except DriverError as error:
             self.get_logger().error(str(error))
             self._close()
             return TransitionCallbackReturn.FAILURE

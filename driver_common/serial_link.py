@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import socket
+import termios
 
 import serial
 from serial.tools import list_ports
@@ -110,14 +112,18 @@ class _Guard:
         if isinstance(error, serial.SerialTimeoutException):
             raise LinkError(f"{self._port} takes no bytes; is flow control on?") from error
         # TypeError: pyserial's own when the port was closed under it.
-        if isinstance(error, (OSError, TypeError)):
+        if isinstance(error, (OSError, TypeError, termios.error)):
             raise LinkError(f"lost {self._port}: {_reason(self._port, error)}") from error
 
 
 def _reason(port: str, error: Exception) -> str:
-    number = getattr(error, "errno", None)
-    if number is None and isinstance(error.__context__, OSError):
-        number = error.__context__.errno
+    number, cause = getattr(error, "errno", None), error.__context__
+    if isinstance(cause, socket.gaierror):
+        return "there is no such host; check its name"
+    if port.startswith("socket:") and isinstance(cause, (TypeError, ValueError, KeyError)):
+        return "a host and a port are needed, as in socket://host:port"
+    if number is None and isinstance(cause, (OSError, termios.error)):
+        number = cause.args[0]
     if number in _ADVICE:
         return _ADVICE[number].format(port=port, ports=_other_ports())
     if "disconnected" in str(error) or "returned no data" in str(error):

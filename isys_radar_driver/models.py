@@ -12,7 +12,7 @@ from dataclasses import KW_ONLY, dataclass, field
 from types import MappingProxyType
 from typing import Protocol
 
-from driver_common.errors import WrongDeviceError
+from driver_common.errors import SettingError, WrongDeviceError
 from driver_common.settings import suggestion
 from isys_radar_driver.targets import Resolution
 
@@ -83,6 +83,19 @@ class Model:
     def cycle_time(self, mode: int) -> float:
         """Return the cycle time in s in a measurement mode."""
         return self.cycle_times.get(mode, next(iter(self.cycle_times.values())))
+
+    def resolutions_of(self, bits: int) -> tuple[Resolution, ...]:
+        """Return the resolutions with 16 or 32 bit; with 0, all.
+
+        Raises:
+            SettingError: There is none.
+        """
+        possible = tuple(resolution for resolution in self.resolutions
+                         if not bits or resolution.bits == bits)
+        if self.has_target_lists and not possible:
+            raise SettingError(f"{self.name} has no target lists of {bits} bit; set "
+                               "target_list_resolution to auto")
+        return possible
 
     def with_firmware(self, version: float) -> Model:
         """Return the model as it is with this firmware (table 11)."""

@@ -14,7 +14,7 @@ from std_msgs.msg import Float32MultiArray
 from driver_common import diagnostics
 from driver_common.device_node import DeviceNode, run
 from driver_common.errors import DriverError, SettingError
-from driver_common.settings import Option
+from driver_common.settings import Option, Value
 from driver_common.simulated_line import SimulatedLine
 from isys_radar_driver import commands
 from isys_radar_driver.commands import Command, RangeList
@@ -124,6 +124,13 @@ class IsysRadarNode(DeviceNode, Listener):
         options.resolution = RESOLUTIONS[self.option("target_list_resolution", name)]
         options.read_range_list = self.option("publish_range_list", name)
         options.read_digital_outputs = self.option("publish_digital_outputs", name)
+
+    def check_option(self, name: str, value: Value) -> None:
+        """Refuse a resolution that the connected model does not have."""
+        for radar in self.bus.devices if self.bus is not None else ():
+            if (name == self.prefix(radar.options.name) + "target_list_resolution"
+                    and radar.model is not None):
+                radar.model.resolutions_of(RESOLUTIONS[str(value)])
 
     def apply_options(self) -> None:
         """Hand live options to the bus."""

@@ -8,7 +8,6 @@ from collections import deque
 from dataclasses import dataclass
 
 from driver_common.device import Device, DeviceOptions
-from driver_common.errors import SettingError
 from isys_radar_driver.commands import Version
 from isys_radar_driver.frames import BROADCAST
 from isys_radar_driver.line import OVERHEAD
@@ -153,12 +152,7 @@ class Radar(Device):
             SettingError: The model does not have the resolution that was asked for.
         """
         assert self.model is not None
-        bits = self.options.resolution
-        possible = [resolution for resolution in self.model.resolutions
-                    if not bits or resolution.bits == bits]
-        if not possible:
-            raise SettingError(f"{self.model.name} has no target lists of {bits} bit; set "
-                               "target_list_resolution to auto")
+        possible = self.model.resolutions_of(self.options.resolution)
         for resolution in possible:
             size = OVERHEAD + self.max_targets * (14 if resolution.bits == 32 else 7)
             if size * 10 / baud_rate < self.cycle_time:

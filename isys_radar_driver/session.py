@@ -92,14 +92,29 @@ class RadarBus:
             baud_rate: In Bd; 0 = try the default rates of the models.
             radars: How each radar is to be used.
             listener: Told of everything that happens.
+
+        Raises:
+            SettingError: Of several radars, one has no address of its own.
         """
         self.line = Line(port)
         self.devices = [Radar(options) for options in radars]
+        self._check_addresses()
         self._baud_rate = baud_rate
         self._listener = listener
         self.link_error: LinkError | None = None
         self._active = False
         self._turn = 0
+
+    def _check_addresses(self) -> None:
+        owners: dict[int, str] = {}
+        for radar in self.devices:
+            name, address = radar.options.name, radar.options.address
+            if len(self.devices) > 1 and address == BROADCAST:
+                raise SettingError(f"{name}.address must be given, as there are several sensors")
+            if address in owners:
+                raise SettingError(f"{name}.address is {address}, but that is the address of "
+                                   f"{owners[address]}")
+            owners[address] = name
 
     # --- what the thread of the bus calls ---
 
@@ -321,6 +336,7 @@ class RadarBus:
             raise WrongDeviceError(f"expected an {expected.name}, but an {identity.model.name} "
                                    f"answers at address {radar.address}; connect the right one or "
                                    "change the parameter model")
+        identity.model.resolutions_of(radar.options.resolution)
         radar.identity = identity
         try:
             self._configure(radar)

@@ -10,6 +10,7 @@ import math
 import time
 
 from driver_common.simulated_line import Faults
+from isys_radar_driver import simulator
 from isys_radar_driver.frames import FrameParser
 from isys_radar_driver.models import find_model
 from isys_radar_driver.radar import Options
@@ -169,16 +170,22 @@ def are_same(measured, truth, tolerance):
 
 
 class Lab:
-    """Lines with simulated radars, and masters on them; all end with the lab."""
+    """Lines with simulated radars, and masters on them; all end with the lab.
+
+    The radars answer faster than real ones, because hundreds of tests read all their settings.
+    """
 
     def __init__(self):
         self._lines = []
         self._masters = []
+        self._turnaround = simulator.TURNAROUND
 
     def __enter__(self):
+        simulator.TURNAROUND = 0.0001
         return self
 
     def __exit__(self, *_):
+        simulator.TURNAROUND = self._turnaround
         for master in self._masters:
             master.bus.close()
         for line in self._lines:

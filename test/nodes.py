@@ -24,6 +24,7 @@ from typing import NamedTuple
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
+from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.srv import (
     DescribeParameters,
@@ -40,7 +41,9 @@ from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
 DEADLINE = 15.0  # s; far more than anything takes, also on a busy machine
-TRANSITIONS = {"configure": 1, "cleanup": 2, "activate": 3, "deactivate": 4}
+TRANSITIONS = {
+    "configure": Transition.TRANSITION_CONFIGURE, "cleanup": Transition.TRANSITION_CLEANUP,
+    "activate": Transition.TRANSITION_ACTIVATE, "deactivate": Transition.TRANSITION_DEACTIVATE}
 
 
 class NodeProcess:
@@ -126,7 +129,6 @@ class Ros:
         self.node = rclpy.create_node("test", context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
-        self._clients = {}
         self._subscriptions = []
         self._statuses = None
 
@@ -140,9 +142,14 @@ class Ros:
 
     def wait_until(self, condition):
         """Return what the condition gives, once that is true."""
-        deadline = time.monotonic() + DEADLINE
-        while not (result := condition()):
-            assert time.monotonic() < deadline, "it does not happen"
+        result = self.wait(condition, DEADLINE)
+        assert result, "it does not happen"
+        return result
+
+    def wait(self, condition, seconds):
+        """Return what the condition gives, once that is true or the time is over."""
+        deadline = time.monotonic() + seconds
+        while not (result := condition()) and time.monotonic() < deadline:
             self._executor.spin_once(timeout_sec=0.05)
         return result
 
@@ -159,20 +166,6 @@ class Ros:
             self.node.destroy_subscription(subscription)
         self._subscriptions.clear()
         self._statuses = None
-
-    def call(self, kind, name, request=None):
-        """Call a service and return its response."""
-        if name not in self._clients:
-            self._clients[name] = self.node.create_client(kind, name)
-        client = self._clients[name]
-        self.wait_until(client.service_is_ready)
-        future = client.call_async(request or kind.Request())
-        self.wait_until(future.done)
-        return future.result()
-
-    def has_service(self, name):
-        """Return whether somebody offers a service."""
-        return name in dict(self.node.get_service_names_and_types())
 
     def wait_for_status(self, name, condition=lambda status: True):
         """Return the first diagnostics from now on with this name and the condition."""
@@ -202,6 +195,7 @@ class RemoteNode:
     def __init__(self, ros, name):
         self.ros = ros
         self.name = name
+        self._clients = {}
 
     def subscribe(self, kind, topic):
         """Return a list which receives every message of a topic of the node."""
@@ -244,9 +238,30 @@ class RemoteNode:
 
     def change_state(self, transition):
         """Carry out a transition and return whether it succeeded."""
-        request = ChangeState.Request()
-        request.transition.id = TRANSITIONS[transition]
-        return self.ros.call(ChangeState, f"{self.name}/change_state", request).success
+        wanted = Transition(id=TRANSITIONS[transition])
+        return self._call(ChangeState, "change_state", transition=wanted).success
 
     def _call(self, kind, service, **fields):
-        return self.ros.call(kind, f"{self.name}/{service}", kind.Request(**fields))
+        if service not in self._clients:
+            self._clients[service] = self.ros.node.create_client(kind, f"{self.name}/{service}")
+            self._meet()
+        self.ros.wait_until(self._clients[service].service_is_ready)
+        future = self._clients[service].call_async(kind.Request(**fields))
+        self.ros.wait_until(future.done)
+        return future.result()
+
+    def _meet(self):
+        """Wait until the node knows our newest client; before, its response could get lost.
+
+        Clients become known in the order in which they were made, and a question can be repeated.
+        """
+        client = self.ros.node.create_client(GetParameters, f"{self.name}/get_parameters")
+        answers = []
+
+        def ask_again():
+            if client.service_is_ready():
+                answers.append(client.call_async(GetParameters.Request()))
+            return self.ros.wait(lambda: any(answer.done() for answer in answers), 0.5)
+
+        self.ros.wait_until(ask_again)
+        self.ros.node.destroy_client(client)

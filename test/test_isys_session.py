@@ -448,29 +448,41 @@ def test_target_lists_are_what_was_in_front_of_the_radar(connect, model, bits):
 
 def test_stamps_follow_the_device_cycle(connect):
     master, _, _ = connect()
-    master.measure(20)
+    master.measure(8)
     stamps = np.array([stamp for _, _, stamp in master.heard.lists]) * 1e-9
     cycles = np.round(np.diff(stamps) / 0.075)
     assert (cycles >= 0).all()
     assert abs(np.median(np.diff(stamps)) - 0.075) < 0.02
 
 
+def radar_of(model, **options):
+    """Return a radar that is known to be of this model, without a line."""
+    radar = Radar(Options(**options))
+    radar.identity = Identity(find_model(model), "", None, None, None, None)
+    return radar
+
+
 @pytest.mark.parametrize(("model", "baud_rate", "bits"), [
-    ("iSYS-4001", 0, 32), ("iSYS-4003", 0, 16), ("iSYS-4003", 115200, 32)])
-def test_auto_takes_the_finest_resolution_that_fits_the_cycle(connect, model, baud_rate, bits):
-    master, _, simulated = connect(model, baud_rate=baud_rate)
+    ("iSYS-4001", 115200, 32), ("iSYS-4001", 9600, 16), ("iSYS-4003", 9600, 16),
+    ("iSYS-4003", 115200, 32), ("iSYS-6005", 230400, 32)])
+def test_auto_takes_the_finest_resolution_that_fits_the_cycle(model, baud_rate, bits):
+    assert radar_of(model).resolution(baud_rate).bits == bits
+
+
+def test_at_its_own_baud_rate_a_4003_sends_16_bit(connect):
+    master, _, simulated = connect("iSYS-4003", baud_rate=0)
     truth = Truth(simulated)
     master.measure()
-    assert master.radar.resolution(master.bus.line.baud_rate).bits == bits
-    truth.confirm(master.heard.lists, half_a_step(model, bits))
+    truth.confirm(master.heard.lists, half_a_step("iSYS-4003", 16))
 
 
-def test_a_resolution_that_the_model_lacks_is_refused_with_a_way_out(connect):
-    master, _, _ = connect("iSYS-6005")
-    master.radar.options.resolution = 16
-    with pytest.raises(SettingError, match="iSYS-6005 has no target lists of 16 bit; set "
-                                           "target_list_resolution to auto"):
-        master.radar.resolution(master.bus.line.baud_rate)
+def test_a_resolution_that_the_model_lacks_is_refused_with_a_way_out(start):
+    line, _ = start("iSYS-6005")
+    master = Master(line.port, Options(resolution=16))
+    assert str(master.lose()) == ("iSYS-6005 has no target lists of 16 bit; set "
+                                  "target_list_resolution to auto")
+    master.radar.options.resolution = 0
+    master.measure()
 
 
 def test_the_length_of_a_fixed_length_list_is_learned(connect):
@@ -489,9 +501,10 @@ def test_the_length_is_learned_from_an_empty_list_as_well(connect):
     assert master.radar.fixed_targets == 10
 
 
-@pytest.mark.parametrize("model", ["iSYS-4001", "iSYS-4003", "iSYS-6005"])
-def test_clipping_is_an_empty_list_and_counted(connect, model):
-    master, _, simulated = connect(model)
+@pytest.mark.parametrize(("model", "bits"), [
+    ("iSYS-4001", 16), ("iSYS-4001", 32), ("iSYS-6005", 32)])
+def test_clipping_is_an_empty_list_and_counted(connect, model, bits):
+    master, _, simulated = connect(model, resolution=bits)
     simulated.clipping = True
     for measured in master.measure(3):
         assert measured.clipping
@@ -618,8 +631,7 @@ def test_board_temperatures_are_read(connect, model):
 
 def counts_of(times):
     """Return how many lists and lost cycles are counted for lists at these times."""
-    radar = Radar(Options())
-    radar.identity = Identity(find_model("4001"), "", None, None, None, None)
+    radar = radar_of("iSYS-4001")
     for now in times:
         radar.count_list(now, clipping=False)
     return radar.statistics.target_lists, radar.statistics.lost_cycles

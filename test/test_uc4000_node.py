@@ -202,6 +202,7 @@ def test_an_echo_in_the_blind_zone_is_minus_infinity(simulated, heard):
 
 def test_a_refused_measurement_publishes_nothing(simulated, heard, ros):
     ranges = heard.all("left/range")
+    ranges.clear()
     simulated["left"].refuse[OpCode.PROFILE_B] = ErrorCode.SESSION_ERROR
     status = ros.wait_for_status("uc4000: left", lambda status: "cannot measure" in status.message)
     assert status.level == WARN

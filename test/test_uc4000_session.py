@@ -896,6 +896,20 @@ def test_a_group_that_does_not_work_together_is_measured_one_by_one(connect, tro
         assert measurement.distance.value == still(int(name[1]) - 1)
 
 
+def test_on_a_bad_line_those_of_a_group_are_not_mixed_up(connect):
+    line, sensors = connect(1, 2, 3)
+    master = connect.master(line, *named(1, 2, 3), groups=["s1 s2 s3"]).find()
+    group = master.bus.groups[0]
+    group.backoff.first = group.backoff.last = 0.01
+    group.backoff.reset()
+    line.faults.corrupt = line.faults.drop = line.faults.noise = 0.05
+    master.until(lambda: group.failures >= 3)
+    line.faults.corrupt = line.faults.drop = line.faults.noise = 0.0
+    master.until(lambda: overlap(sensors[0], sensors[1]))
+    for name, measurement in master.heard.measurements:
+        assert measurement.distance.value == still(int(name[1]) - 1)
+
+
 @pytest.mark.parametrize(("groups", "text"), [
     (["left rear", "front left"], "groups: left is in two groups"),
     (["left raer"], 'groups: there is no sensor "raer"; did you mean "rear"?'),

@@ -46,9 +46,12 @@ NOISE_TIME = 2.0  # s to wait for such a silence
 SLICE = 0.1  # s after which a long wait looks whether it is to end
 
 REQUEST_TIME = REQUEST_LENGTH * BYTE_TIME
-# Time between two requests of a group. So far apart, their replies come one after the other,
-# wherever in its spread each is. 2 ms more for the jitter of the host.
-STAGGER = REPLY_SPREAD + SHORT_REPLY * BYTE_TIME + GAP + 0.002
+# With several sensors measuring: the time from the end of a measurement in which its reply has to
+# arrive, and the time between two requests. So the replies come one after the other, in the order
+# of the requests, and one that is out of order is noticed.
+GROUP_LATENCY = 0.008  # s, allowance for adapters and the host; more would leave fewer sensors
+REPLY_WINDOW = REPLY_SPREAD + SHORT_REPLY * BYTE_TIME + GROUP_LATENCY
+STAGGER = REPLY_WINDOW + GAP
 
 ECHO_CHOICES = {"auto": None, "on": True, "off": False}
 
@@ -151,8 +154,8 @@ class Line:
         """Have several sensors measure at the same time.
 
         Replies do not say from whom they are, but they come in the order of the requests. So only
-        a full set of distances counts: with one missing, or a refusal, which comes at once, it
-        would be a guess whose they are.
+        a full set of distances counts, each in its time. With one missing, damaged, late or a
+        refusal, which comes at once, it would be a guess whose they are.
 
         Args:
             asked: Addresses and what is asked there; all measure with the same number of cycles.
@@ -211,6 +214,7 @@ class Line:
         self.stray_bytes += len(self.link.read(0))
         parser = ReplyParser(command.reply_length)
         times: list[int] = []
+        ends: list[float] = []  # of the measurements, monotonic
         next_time = time.monotonic()
         last_time = next_time + command.duration - REQUEST_TIME - GAP
         for request in requests:
@@ -219,6 +223,7 @@ class Line:
                 break
             self.link.write(request)
             times.append(time.time_ns() + round(REQUEST_TIME * 1e9))
+            ends.append(time.monotonic() + REQUEST_TIME + command.duration)
             next_time = time.monotonic() + STAGGER
             parser.sent(request)
         timeout = command.duration + (REPLY_SPREAD if command.duration else REPLY_TIMEOUT)
@@ -226,6 +231,8 @@ class Line:
         self._receive_all(time.monotonic() + REQUEST_TIME + timeout + LATENCY, parser)
         try:
             self._check(parser, who)
+            if len(ends) > 1:
+                self._check_order(parser, ends, who)
         except DriverError:
             self._late.add(command.reply_length)
             self._late_until = time.monotonic() + command.duration
@@ -236,7 +243,7 @@ class Line:
     def _receive_until(self, end: float, parser: ReplyParser) -> None:
         """Take what arrives until a time."""
         while (remaining := end - time.monotonic()) > 0:
-            parser.feed(self.link.read(remaining))
+            parser.feed(self.link.read(remaining), time.monotonic())
 
     def _receive_all(self, deadline: float, parser: ReplyParser) -> None:
         """Take what arrives until all replies are there, or the time is over.
@@ -251,7 +258,7 @@ class Line:
             remaining = max(0.0, deadline - time.monotonic())
             data = self.link.read(BYTE_GAP if parser.pending else min(SLICE, remaining))
             if data:
-                parser.feed(data)
+                parser.feed(data, time.monotonic())
             elif parser.pending:
                 parser.gap()
         if parser.complete:
@@ -275,3 +282,10 @@ class Line:
         if wanted and not parser.echo:
             hint = ", not even the echo of what was sent: is the line connected, or local_echo off?"
         raise NoAnswerError(f"no answer from {who} on {self.port}{hint}")
+
+    @staticmethod
+    def _check_order(parser: ReplyParser, ends: Sequence[float], who: str) -> None:
+        """Raise where it is not certain that the replies are in the order of the requests."""
+        if parser.damaged or any(arrived > end + REPLY_WINDOW
+                                 for arrived, end in zip(parser.times, ends, strict=True)):
+            raise FrameError(f"damaged or late replies from {who}")

@@ -322,8 +322,12 @@ class Uc4000Bus:
     def _look_again(self, sensor: Sensor) -> None:
         """Look after a silence whether the sensor is as it was: it may have lost its settings."""
         self._check_address(sensor, attempts=1)
-        before = sensor.values
-        self._read_all(sensor)
+        settings, before = sensor.settings, sensor.values
+        try:
+            self._read_all(sensor)
+        except DriverError:
+            sensor.settings, sensor.values = settings, before
+            raise
         if sensor.values != before:
             sensor.acknowledged.clear()  # it must be taken for lost as well
             self._read_all(sensor)

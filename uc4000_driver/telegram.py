@@ -133,6 +133,7 @@ class ReplyParser:
 
     Attributes:
         replies: The replies found so far.
+        times: When each was complete, as `feed` was told.
         echo: Whether the line returns the master's own bytes; None while that cannot be told.
         damaged: The last bytes that were no reply.
         skipped: Number of bytes in front of a long reply.
@@ -144,7 +145,9 @@ class ReplyParser:
         self._count = 0
         self._buffer = bytearray()
         self._own = b""  # own bytes that may still come back
+        self._now = 0.0
         self.replies: list[Reply] = []
+        self.times: list[float] = []
         self.echo: bool | None = None
         self.damaged = b""
         self.skipped = 0
@@ -165,8 +168,9 @@ class ReplyParser:
         if self.echo is not False:
             self._own += request
 
-    def feed(self, data: bytes) -> None:
-        """Take bytes."""
+    def feed(self, data: bytes, now: float = 0.0) -> None:
+        """Take bytes that arrived now."""
+        self._now = now
         self._buffer += data[:_MAX_PENDING - len(self._buffer)]  # noise has no end
         if self._own:
             if self._own.startswith(bytes(self._buffer[:len(self._own)])):
@@ -208,6 +212,7 @@ class ReplyParser:
         if self.echo is None and not start and not self.damaged:
             self.echo = False
         self.replies.append(reply)
+        self.times.append(self._now)
         self.skipped += start
         del self._buffer[:start + length]
 

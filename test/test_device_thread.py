@@ -1,0 +1,222 @@
+"""The thread of a bus: it runs the work of others, and opens the bus again for ever."""
+
+from __future__ import annotations
+
+import queue
+import threading
+
+import pytest
+
+from driver_common.device_thread import Backoff, DeviceThread
+from driver_common.errors import DriverError, LinkError, NoAnswerError, RefusedError
+
+DEADLINE = 10.0  # s
+FOREVER = 3600.0  # s
+
+
+class FakeBus:
+    """A bus whose steps wait for the test: each poll takes what `steps` holds."""
+
+    def __init__(self):
+        self.steps = queue.SimpleQueue()
+        self.failures = []
+        self.events = []
+
+    def open(self):
+        if self.failures:
+            raise self.failures.pop(0)
+        self.events.append("open")
+
+    def poll(self):
+        self.events.append("poll")
+        step = self.steps.get(timeout=DEADLINE)
+        if isinstance(step, Exception):
+            raise step
+        return step
+
+    def close(self):
+        self.events.append("close")
+
+
+class InterruptibleBus(FakeBus):
+    """A bus whose present step can be ended."""
+
+    def interrupt(self):
+        self.steps.put(LinkError("interrupted"))
+
+
+@pytest.fixture
+def bus():
+    return FakeBus()
+
+
+@pytest.fixture
+def start():
+    """Start threads, each with a queue of the states that it told."""
+    threads = []
+
+    def start_one(bus):
+        states = queue.SimpleQueue()
+        thread = DeviceThread("bus", bus, states.put)
+        threads.append((thread, bus))
+        thread.start()
+        return thread, states
+
+    yield start_one
+    for thread, bus in threads:
+        bus.steps.put(FOREVER)
+        thread.stop()
+
+
+def next_state(states):
+    return states.get(timeout=DEADLINE)
+
+
+def test_pauses_double_up_to_the_longest():
+    backoff = Backoff(0.1, 2.0)
+    pauses = [backoff.pause() for _ in range(7)]
+    assert pauses == pytest.approx([0.1, 0.2, 0.4, 0.8, 1.6, 2.0, 2.0])
+    backoff.reset()
+    assert backoff.pause() == 0.1
+
+
+def test_a_shorter_longest_pause_counts_at_once():
+    backoff = Backoff(0.1, 10.0)
+    for _ in range(7):
+        backoff.pause()
+    backoff.last = 2.0
+    assert backoff.pause() == 2.0
+
+
+def test_work_runs_in_the_thread_and_gives_its_result(bus, start):
+    thread, _ = start(bus)
+    bus.steps.put(FOREVER)
+    assert thread.call(threading.current_thread) is thread
+
+
+def test_work_does_not_wait_for_the_pause_of_the_bus(bus, start):
+    thread, _ = start(bus)
+    bus.steps.put(FOREVER)
+    assert thread.call(lambda: 1) == 1
+    bus.steps.put(FOREVER)
+    assert thread.call(lambda: 2) == 2
+
+
+def test_work_that_fails_fails_for_its_caller_alone(bus, start):
+    thread, states = start(bus)
+    assert next_state(states) is None
+
+    def refuse():
+        raise RefusedError("no")
+
+    for error in (RefusedError("no"), ZeroDivisionError("oh")):
+        def fail(error=error):
+            raise error
+
+        bus.steps.put(FOREVER)
+        with pytest.raises(type(error), match=str(error)):
+            thread.call(fail)
+    bus.steps.put(FOREVER)
+    assert thread.call(lambda: 5) == 5
+    assert states.empty()
+
+
+def test_work_may_ask_for_more_work(bus, start):
+    thread, _ = start(bus)
+    bus.steps.put(FOREVER)
+    assert thread.call(lambda: thread.call(lambda: 7)) == 7
+
+
+def test_posted_work_is_done_without_waiting(bus, start):
+    thread, _ = start(bus)
+    done = threading.Event()
+    thread.post(done.set)  # the bus is in the midst of its step
+    assert not done.is_set()
+    bus.steps.put(FOREVER)
+    assert done.wait(DEADLINE)
+
+
+def test_a_bus_that_is_busy_is_not_waited_for_and_the_work_is_forgotten(bus, start):
+    thread, _ = start(bus)
+    done = []
+    with pytest.raises(NoAnswerError, match=r"busy for more than 0\.05 s"):
+        thread.call(lambda: done.append(1), timeout=0.05)
+    bus.steps.put(FOREVER)
+    assert thread.call(lambda: 2) == 2
+    assert done == []
+
+
+def test_a_bus_that_cannot_be_opened_is_tried_again(bus, start):
+    bus.failures = [LinkError("not there"), LinkError("not there")]
+    thread, states = start(bus)
+    assert [str(next_state(states)) for _ in range(2)] == ["not there", "not there"]
+    assert next_state(states) is None
+    bus.steps.put(FOREVER)
+    thread.call(lambda: None)
+    assert bus.events[:4] == ["close", "close", "open", "poll"]
+
+
+def test_work_is_done_also_while_the_bus_is_closed(bus, start):
+    bus.failures = [LinkError("not there")] * 1000
+    thread, states = start(bus)
+    next_state(states)
+    assert thread.call(lambda: list(bus.events))
+    with pytest.raises(NoAnswerError, match="not connected"):
+        thread.call(lambda: (_ for _ in ()).throw(NoAnswerError("not connected")))
+
+
+def test_after_an_error_the_bus_is_closed_and_opened_again(bus, start):
+    _, states = start(bus)
+    assert next_state(states) is None
+    bus.steps.put(LinkError("unplugged"))
+    assert str(next_state(states)) == "unplugged"
+    assert next_state(states) is None
+    assert bus.events[:5] == ["open", "poll", "close", "open", "poll"] or (
+        bus.events[:4] == ["open", "poll", "close", "open"])
+
+
+def test_an_error_in_the_code_is_told_with_its_place_and_ends_nothing(bus, start):
+    _, states = start(bus)
+    assert next_state(states) is None
+    bus.steps.put(ZeroDivisionError("oh"))
+    error = next_state(states)
+    assert isinstance(error, DriverError)
+    assert "internal error, please report it: ZeroDivisionError: oh" in str(error)
+    assert "test_device_thread.py:" in str(error)
+    assert next_state(states) is None
+
+
+def test_stopping_closes_the_bus_and_ends_the_thread(bus, start):
+    thread, states = start(bus)
+    assert next_state(states) is None
+    bus.steps.put(0.0)
+    bus.steps.put(FOREVER)
+    thread.stop()
+    assert not thread.is_alive()
+    assert bus.events[-1] == "close"
+    with pytest.raises(NoAnswerError, match="the link is closed"):
+        thread.call(lambda: None)
+
+
+def test_stopping_does_not_wait_for_a_long_pause(bus, start):
+    bus.failures = [LinkError("not there")] * 1000
+    thread, states = start(bus)
+    next_state(states)
+    thread.stop()
+    assert not thread.is_alive()
+
+
+def test_stopping_interrupts_a_step_where_the_bus_can(start):
+    bus = InterruptibleBus()
+    thread, states = start(bus)
+    assert next_state(states) is None
+    thread.stop()
+    assert not thread.is_alive()
+    assert states.empty()  # the interruption is no error
+
+
+def test_a_thread_that_was_never_started_can_be_stopped(bus):
+    thread = DeviceThread("bus", bus, lambda error: None)
+    thread.stop()
+    with pytest.raises(NoAnswerError):
+        thread.call(lambda: None)

@@ -1,0 +1,344 @@
+"""What a session makes of a bad line: interruptions, damage, late replies, several radars."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import random
+import time
+
+import numpy as np
+import pytest
+from isys_master import (
+    DEADLINE,
+    Lab,
+    Master,
+    Recorder,
+    Script,
+    Truth,
+    counted_requests,
+    function_code,
+    half_a_step,
+)
+
+from driver_common.device_thread import DeviceThread
+from driver_common.errors import FrameError, LinkError, NoAnswerError, RefusedError
+from isys_radar_driver import commands, session
+from isys_radar_driver import line as isys_line
+from isys_radar_driver.commands import Location
+from isys_radar_driver.frames import FrameParser
+from isys_radar_driver.radar import Options
+from isys_radar_driver.session import RadarBus
+from isys_radar_driver.targets import Target
+
+
+@pytest.fixture
+def lab():
+    with Lab() as lab:
+        yield lab
+
+
+@pytest.fixture
+def start(lab):
+    return lab.start
+
+
+@pytest.fixture
+def connect(lab):
+    return lab.connect
+
+
+def wait_until(condition):
+    deadline = time.monotonic() + DEADLINE
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+# --- interruptions -----------------------------------------------------------------------------
+
+def test_after_a_power_cycle_the_settings_are_applied_again(connect):
+    master, _, simulated = connect(wanted={"output1.range_max": 42.0})
+    master.bus.write(master.radar, {"frequency_channel": 3})
+    master.measure()
+    simulated.power_cycle()
+    assert simulated.value("output1.range_max") == 150.0
+    master.lists(2)
+    assert simulated.value("output1.range_max") == 42.0
+    assert simulated.value("frequency_channel") == 3
+
+
+def test_a_reset_without_notice_is_noticed_by_the_refusal(connect):
+    master, _, simulated = connect(wanted={"output1.range_max": 42.0})
+    master.measure()
+    simulated.power_cycle(now=-math.inf)  # it answers again at once
+    master.lists(2)
+    assert master.heard.lost == []
+    assert simulated.value("output1.range_max") == 42.0
+    assert any("configuring it again" in note for note in master.heard.notes)
+
+
+@pytest.mark.parametrize("name", ["iSYS-4001", "iSYS-5010", "iSYS-5020", "iSYS-5110"])
+def test_a_reset_without_notice_is_noticed_while_the_radar_is_idle(connect, monkeypatch, name):
+    monkeypatch.setattr(session, "KEEP_ALIVE", 0.02)
+    master, _, simulated = connect(name)
+    setting = {"iSYS-4001": "output1.range_max", "iSYS-5010": "moving_target_sensitivity.near_db",
+               "iSYS-5020": "moving_target_sensitivity.near_db",
+               "iSYS-5110": "stop_bar_zone1.range_max"}[name]
+    master.bus.write(master.radar, {setting: 9.0})
+    simulated.power_cycle(now=-math.inf)
+    master.until(lambda: simulated.value(setting) == 9.0)
+
+
+def test_a_radar_that_goes_silent_is_lost_and_returns(connect):
+    master, _, simulated = connect()
+    master.measure()
+    simulated.silent = True
+    error = master.lose()
+    assert "no answer" in str(error) or "does not answer" in str(error)
+    assert master.radar.identity is None
+    simulated.silent = False
+    master.lists(3)
+    assert master.radar.statistics.connections == 2
+    assert master.radar.error is None
+
+
+def test_a_line_that_is_unplugged_is_an_error_that_says_so(connect):
+    master, line, _ = connect()
+    master.measure()
+    line.close()
+    with pytest.raises(LinkError, match=f"lost {line.port}: "):
+        master.measure()
+    master.bus.close()
+    assert master.radar.identity is None
+
+
+def test_a_line_that_is_plugged_in_again_is_opened_and_measures(start, tmp_path):
+    link = str(tmp_path / "radar")
+    line, _ = start("iSYS-4001", link=link)
+    heard, states = Recorder(), []
+    bus = RadarBus(link, 0, [Options(wanted={"output1.range_max": 42.0})], heard)
+    thread = DeviceThread("bus", bus, states.append)
+    thread.start()
+    try:
+        thread.call(lambda: bus.set_active(True))
+        wait_until(lambda: len(heard.lists) > 2)
+        line.close()
+        wait_until(lambda: len(states) > 2)
+        assert "lost" in str(states[1]) or "open" in str(states[1])
+        assert bus.devices[0].identity is None
+        before = len(heard.lists)
+        _, again = start("iSYS-4001", link=link)
+        wait_until(lambda: len(heard.lists) > before + 2)
+        assert states[-1] is None
+        assert again.value("output1.range_max") == 42.0
+    finally:
+        thread.stop()
+    assert not again.measuring
+
+
+def test_closing_leaves_every_radar_stopped(start):
+    line, first, second = start("iSYS-4001", addresses=[10, 11])
+    master = Master(line.port, Options("front", address=10), Options("rear", address=11)).find()
+    master.measure(4)
+    assert first.measuring
+    assert second.measuring
+    master.bus.close()
+    assert not first.measuring
+    assert not second.measuring
+
+
+# --- a bad line --------------------------------------------------------------------------------
+
+@pytest.mark.parametrize("faults", [
+    {"split": 0.02}, {"delay": 0.02}, {"noise": 1.0}, {"drop": 0.1}, {"corrupt": 0.2},
+    {"echo": True}, {"drop": 0.05, "corrupt": 0.1, "noise": 0.5, "split": 0.005, "echo": True}],
+    ids=lambda faults: " ".join(faults))
+def test_nothing_wrong_is_ever_accepted_from_a_bad_line(connect, faults):
+    master, line, simulated = connect("iSYS-6005", wanted={"output1.range_max": 19.0})
+    truth = Truth(simulated)
+    for name, value in faults.items():
+        setattr(line.faults, name, value)
+    master.measure(10)
+    truth.confirm(master.heard.lists, half_a_step("iSYS-6005", 32))
+    assert master.radar.values == {name: simulated.value(name) for name in simulated.settings}
+
+
+def test_damaged_frames_and_noise_are_counted(connect):
+    master, line, _ = connect()
+    parser = master.bus.line.parser
+    assert (parser.damaged_frames, parser.dropped_bytes) == (0, 0)
+    line.faults.corrupt = 0.5
+    line.faults.noise = 1.0
+    master.bus.set_active(True)
+    master.until(lambda: parser.damaged_frames and parser.dropped_bytes > 20)
+
+
+def test_settings_arrive_over_a_bad_line(connect):
+    master, line, simulated = connect()
+    line.faults.drop = line.faults.corrupt = 0.05
+    generator = random.Random(3)
+    for _ in range(12):
+        value = round(generator.uniform(1, 150), 1)
+        try:
+            reported = master.bus.write(master.radar, {"output1.range_max": value})
+        except (NoAnswerError, FrameError):
+            master.find()  # it was lost with the answer
+            continue
+        assert reported == {"output1.range_max": value}
+        assert simulated.value("output1.range_max") == value
+
+
+def sensitivity(master, side):
+    """Read one of two settings whose replies look alike, once."""
+    record = master.radar.settings[f"threshold_sensitivity.{side}_db"].record
+    return master.bus.read_record(master.radar, record, Location.RAM)
+
+
+@pytest.fixture
+def late(connect):
+    """A radar whose next replies come as late as the list says; 0 when it is empty."""
+    master, line, simulated = connect()
+    simulated.set_value("threshold_sensitivity.left_db", 1.0)
+    simulated.set_value("threshold_sensitivity.right_db", 2.0)
+    delays, last = [], [0.0]
+
+    def delayed(due, reply):
+        last[0] = max(last[0], due + (delays.pop(0) if delays else 0.0))  # never overtaking
+        return [(last[0], reply)]
+
+    line.faults = Script(delayed)
+    return master, simulated, delays
+
+
+def test_a_late_reply_is_not_taken_for_the_answer_to_the_next_request(late):
+    master, _, delays = late
+    delays.append(isys_line.REPLY_TIMEOUT + 0.05)
+    stale = master.bus.line.stale_frames
+    record = master.radar.settings["threshold_sensitivity.left_db"].record
+    with pytest.raises(NoAnswerError):
+        master.bus._exchange(master.radar, record.read_request(128), lambda frame: frame,
+                             isys_line.REPLY_TIMEOUT, attempts=1)
+    assert sensitivity(master, "right") == (20,)  # the late one says 10, in the same form
+    assert master.bus.line.stale_frames > stale
+
+
+def test_a_late_refusal_is_not_taken_for_the_answer_to_the_next_request(late):
+    master, simulated, delays = late
+    delays.append(isys_line.REPLY_TIMEOUT + 0.05)
+    simulated.refuse.add(commands.READ_SENSOR)
+    record = master.radar.settings["threshold_sensitivity.left_db"].record
+    with pytest.raises(NoAnswerError):
+        master.bus._exchange(master.radar, record.read_request(128), lambda frame: frame,
+                             isys_line.REPLY_TIMEOUT, attempts=1)
+    simulated.refuse.clear()
+    assert sensitivity(master, "right") == (20,)
+
+
+def test_a_late_target_list_is_not_taken_for_that_of_another_output(connect):
+    master, line, _ = connect()
+    master.measure()
+    late_lists = [0.4]
+    line.faults = Script(lambda due, reply: [(due + (
+        late_lists.pop() if function_code(reply) == 0xDA and late_lists else 0.0), reply)])
+    master.until(lambda: master.radar.statistics.timeouts)
+    master.radar.options.output = 2
+    assert [measured.output for measured in master.lists(3)] == [2, 2, 2]
+
+
+def test_whatever_comes_late_every_answer_is_the_right_one(late):
+    master, simulated, delays = late
+    generator = random.Random(5)
+    right = {"left": (10,), "right": (20,)}
+    answered = 0
+    for _ in range(30):
+        delays[:] = [generator.choice((0.0, 0.0, 0.0, 0.09, 0.11, 0.25)) for _ in range(3)]
+        if generator.random() < 0.2:
+            simulated.refuse.add(commands.READ_SENSOR)
+        side = generator.choice(("left", "right"))
+        try:
+            assert sensitivity(master, side) == right[side]
+            answered += 1
+        except NoAnswerError:
+            pass
+        except RefusedError:
+            assert simulated.refuse
+        simulated.refuse.clear()
+    assert answered > 5
+
+
+def test_a_reply_from_another_address_is_not_accepted(connect):
+    master, line, _ = connect()
+
+    def foreign(due, reply):
+        (frame,) = FrameParser().feed(reply)
+        other = dataclasses.replace(frame, source=99, pdu=bytes(len(frame.pdu)))
+        return [(due, other.encode()), (due, reply)]
+
+    before = sensitivity(master, "left")
+    line.faults = Script(foreign)
+    stale = master.bus.line.stale_frames
+    assert sensitivity(master, "left") == before
+    assert master.bus.line.stale_frames > stale
+
+
+def test_the_echo_of_our_own_bytes_is_no_reply(connect):
+    master, line, simulated = connect()
+    line.faults.echo = True
+    master.bus.write(master.radar, {"output1.range_max": 12.0})
+    assert simulated.value("output1.range_max") == 12.0
+    master.measure(8)
+    assert master.bus.line.stale_frames < 8
+
+
+def test_a_radar_is_found_on_a_line_with_echo(start):
+    line, _ = start("iSYS-4001")
+    line.faults.echo = True
+    assert Master(line.port).find().radar.address == 128
+
+
+# --- several radars on one line ----------------------------------------------------------------
+
+def test_several_radars_take_turns(start):
+    line, first, second = start("iSYS-4001", addresses=[10, 11])
+    first.scene = lambda now: [Target(40.0, 1.0, 10.0, 0.1)]
+    second.scene = lambda now: [Target(50.0, 2.0, 20.0, -0.1)]
+    master = Master(line.port, Options("front", address=10), Options("rear", address=11)).find()
+    master.measure(10)
+    distances = {"front": 10.0, "rear": 20.0}
+    for name, measured, _ in master.heard.lists:
+        assert [target.range for target in measured.targets] == pytest.approx([distances[name]])
+    counts = {name: sum(1 for heard, *_ in master.heard.lists if heard == name)
+              for name in distances}
+    assert abs(counts["front"] - counts["rear"]) <= 1
+
+
+def test_a_silent_radar_is_asked_more_and_more_rarely_and_returns_by_itself(start):
+    line, first, second = start("iSYS-4001", addresses=[10, 11])
+    master = Master(line.port, Options("front", address=10), Options("rear", address=11)).find()
+    master.measure(4)
+    second.silent = True
+    assert master.lose() is not None
+    requests = counted_requests(second)
+    master.lists()
+    truth = Truth(first)
+    front = master.bus.devices[0].statistics
+    lists, lost = front.target_lists, front.lost_cycles
+    master.until(lambda: len(requests) >= 3)
+    pauses = np.diff(requests)
+    assert pauses[1] > 1.2 * pauses[0]
+    cycles = round((truth.recorded[-1][0] - truth.recorded[0][0]) / 0.075) + 1
+    assert front.target_lists - lists > 0.5 * cycles  # it waits for the other's time-outs alone
+    assert (front.target_lists - lists) + (front.lost_cycles - lost) == pytest.approx(cycles, abs=3)
+    second.silent = False
+    start_of_return = len(master.heard.lists)
+    master.until(lambda: "rear" in [name for name, *_ in master.heard.lists[start_of_return:]])
+    assert [name for name, _ in master.heard.lost] == ["rear"]
+
+
+def test_settings_go_to_the_radar_that_is_meant(start):
+    line, first, second = start("iSYS-4001", addresses=[10, 11])
+    master = Master(line.port, Options("front", address=10), Options("rear", address=11)).find()
+    master.bus.write(master.bus.devices[1], {"output1.range_max": 12.0})
+    assert first.value("output1.range_max") == 150.0
+    assert second.value("output1.range_max") == 12.0
