@@ -15,7 +15,7 @@ from driver_common import diagnostics
 from driver_common.device_node import DeviceNode, run
 from driver_common.errors import DriverError
 from driver_common.settings import Option
-from icotronic_driver.commands import CLOCK
+from icotronic_driver.commands import CLOCK, parse_request
 from icotronic_driver.eeprom import PAGE_NAMES, Field, FieldValue
 from icotronic_driver.identifier import STH_1, STU_1
 from icotronic_driver.line import Line
@@ -33,6 +33,10 @@ CHANNELS = {channels: code for code, channels in enumerate(
     ("x", "y", "z", "xy", "xz", "yz", "xyz"))}
 SIGNED_AXES = {sign + axis: code for code, (sign, axis) in enumerate(
     (sign, axis) for sign in ("", "-") for axis in AXES)}
+STREAM_OPTIONS = ("channels", *(f"axis.{axis}" for axis in AXES), "sample_rate",
+                  "calibration_source", "acceleration_range_g", "linear_acceleration_stddev",
+                  "time_offset")
+RECEIVERS = {"sth": STH_1, "stu": STU_1}
 LOSS_LIMIT = 0.01  # share of the frames that may be lost without a warning
 QUEUE_TIME = 0.2  # s of samples that a publisher keeps for slow subscribers
 QUEUE_DEPTH = 2000  # enough for QUEUE_TIME at the default rate
@@ -81,6 +85,11 @@ class IcotronicNode(DeviceNode, Listener):
         Option("status_period", kind=float, default=8.0, minimum=0.5, maximum=3600.0, unit="s",
                live=True, description="Time in which battery, temperature, RSSI, states and "
                                       "counters are read once"),
+        Option("command", kind=str, default="read_state", live=True,
+               description="What the service ~/execute_command asks: the name of a command and "
+                           "its arguments, such as write_state 2"),
+        Option("command_receiver", kind=str, choices=RECEIVERS, default="sth", live=True,
+               description="Who is asked: the sensor (sth) or the stationary unit (stu)"),
         Option("time_offset", kind=float, default=0.0, minimum=-10.0, maximum=10.0, unit="s",
                live=True,
                description="Added to every stamp; negative where the measurement was earlier"),
@@ -90,6 +99,7 @@ class IcotronicNode(DeviceNode, Listener):
     def __init__(self) -> None:
         """Declare the parameters; raises SettingError."""
         self._simulator: SimulatedIcotronic | None = None
+        self._stream_options: list[Any] = []
         self._topics: dict[str, Any] = {}
         super().__init__("icotronic")
 
@@ -108,6 +118,7 @@ class IcotronicNode(DeviceNode, Listener):
             sensor_number=self.option("sensor_number"),
             wanted=self.wanted_settings(""), config_mode=self.option("config_mode"))
         self._set_live(sensor)
+        self._stream_options = self._read_stream_options()
         return IcotronicBus(Line(interface, channel, self.option("can_bitrate"), options),
                             sensor, self)
 
@@ -126,13 +137,18 @@ class IcotronicNode(DeviceNode, Listener):
         options.status_period = self.option("status_period")
 
     def apply_options(self) -> None:
-        """Hand live options to the bus; the stream begins anew with them."""
+        """Hand live options to the bus; the stream begins anew with those that it depends on."""
         if self.bus is not None and self.thread is not None:
-            self.thread.post(partial(self._restart_with_options, self.bus))
+            self.thread.post(partial(self._apply_options, self.bus))
 
-    def _restart_with_options(self, bus: IcotronicBus) -> None:
+    def _apply_options(self, bus: IcotronicBus) -> None:
         self._set_live(bus.sensor.options)
-        bus.restart_stream()
+        before, self._stream_options = self._stream_options, self._read_stream_options()
+        if self._stream_options != before:
+            bus.restart_stream()
+
+    def _read_stream_options(self) -> list[Any]:
+        return [self.option(name) for name in STREAM_OPTIONS]
 
     def make_interfaces(self, sensor: str) -> None:
         """Create topics and services."""
@@ -150,6 +166,7 @@ class IcotronicNode(DeviceNode, Listener):
                 ("read_eeprom", lambda: self._read_eeprom(STH_1)),
                 ("read_stu_eeprom", lambda: self._read_eeprom(STU_1)),
                 ("measure_calibration", self._measure),
+                ("execute_command", self._execute_command),
                 ("preview_save", self._preview_save),
                 ("save_all_settings", self._save)):
             self.add_trigger(sensor, name, action)
@@ -245,6 +262,11 @@ class IcotronicNode(DeviceNode, Listener):
     def _measure(self) -> str:
         results = self.call(self.bus.measure)
         return "; ".join(f"{name}: {value:g}" for name, value in results.items())
+
+    def _execute_command(self) -> str:
+        text, receiver = self.option("command"), RECEIVERS[self.option("command_receiver")]
+        request = parse_request(text, receiver)
+        return f"{request.name}: {self.call(lambda: self.bus.execute(request))}"
 
     def _preview_save(self) -> str:
         return f"saving would change {_changes(self.call(self.bus.unsaved))}"

@@ -431,6 +431,23 @@ def test_a_service_that_the_sensor_refuses_says_why(station):
     assert "Sleep Time 1 was not saved: STH 1 cannot write the EEPROM" in response.message
 
 
+@pytest.mark.parametrize(("command", "receiver", "success", "message"), [
+    ("read_state", "sth", True, "read the state: State(location=<CodeLocation.APPLICATION: 2>, "
+                                "state=<NetworkState.OPERATING: 5>)"),
+    ("read_release_name", "stu", True, "read the release name: Valerie"),
+    ("read_eeprom 0 0 1", "sth", True, "read the EEPROM: b'\\xac'"),
+    ("raed_state", "sth", False, 'there is no command "raed_state"; did you mean "read_state"?'),
+    ("write_state", "sth", False, "write_state takes (state: 'NetworkState'"),
+])
+def test_any_command_can_be_asked_by_name(station, command, receiver, success, message):
+    streams = station.network.streamed
+    assert station.remote.set("command_receiver", receiver).successful
+    assert station.remote.set("command", command).successful
+    response = station.remote.trigger("execute_command")
+    assert (response.success, response.message[:len(message)]) == (success, message)
+    assert station.network.streamed >= streams  # and it streams on
+
+
 @pytest.mark.parametrize("service", ["reconnect", "reset_sth", "reset_stu"])
 def test_after_a_service_that_disconnects_the_stream_comes_back(station, service):
     line = len(station.process.lines)
