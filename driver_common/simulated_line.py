@@ -147,7 +147,8 @@ class SimulatedLine:
             self._schedule(now, data)
         for due, reply in self._device.receive(data, arrived):
             for piece_due, piece in self.faults.apply(due, reply):
-                self._schedule(max(piece_due, self._late_until), piece)
+                piece_due = max(piece_due, self._late_until)
+                self._schedule(piece_due, piece)
                 if self.faults.delay:
                     self._late_until = piece_due  # nothing overtakes what is under way
 

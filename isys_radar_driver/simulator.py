@@ -25,6 +25,7 @@ from isys_radar_driver.frames import (
     BROADCAST,
     FAILURE,
     FIRST_ADDRESS,
+    LAST_ADDRESS,
     MASTER,
     MAX_GAP,
     READ_RAW_SIGNALS,
@@ -217,7 +218,7 @@ class SimulatedRadar:
     def _write_sensor(self, pdu: bytes, now: float) -> bytes:
         if pdu[:2] == commands.READ_ADDRESS.sub_function:
             (address,) = struct.unpack(">H", pdu[2:])
-            if not FIRST_ADDRESS <= address <= 255:
+            if not FIRST_ADDRESS <= address <= LAST_ADDRESS:
                 raise Refusal
             self.address = address  # stored at once, acknowledged from the new one (errata I17)
             return b""
@@ -512,8 +513,15 @@ def simulated_line(models: Sequence[str], addresses: Sequence[int] = (), *, baud
 
     Raises:
         WrongDeviceError: A model is not known.
+        SettingError: An address or the baud rate is not possible.
         LinkError: The link or the TCP port cannot be made.
     """
+    for address in addresses:
+        if not FIRST_ADDRESS <= address <= LAST_ADDRESS:
+            raise SettingError(f"address {address} is out of range, allowed is "
+                               f"{FIRST_ADDRESS} … {LAST_ADDRESS}")
+    if baud_rate < 0:
+        raise SettingError(f"{baud_rate} is no baud rate")
     count = max(len(models), len(addresses))
     padded = [*models, *[models[-1]] * (count - len(models))]
     radars = [SimulatedRadar(find_model(name), address, serial_number=index + 1)

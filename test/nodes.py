@@ -46,23 +46,20 @@ TRANSITIONS = {
     "activate": Transition.TRANSITION_ACTIVATE, "deactivate": Transition.TRANSITION_DEACTIVATE}
 
 
-class NodeProcess:
-    """A node that runs as its user would run it; all it prints is collected.
+class Process:
+    """A program of this package that runs by itself; all it prints is collected.
 
     Args:
-        module: Module whose `main` runs the node.
-        parameters: Values for `-p`.
-        arguments: More ROS arguments, for example "-r", "__ns:=/left".
+        module: Module whose `main` is the program.
+        arguments: Its arguments.
     """
 
-    def __init__(self, module, parameters=None, *arguments):
-        for name, value in (parameters or {}).items():
-            arguments += "-p", f"{name}:={json.dumps(value)}"
+    def __init__(self, module, *arguments):
         self.lines = []
         self._news = threading.Condition()
         self._process = subprocess.Popen(
-            [sys.executable, "-c", f"from {module} import main; main()", "--ros-args", *arguments],
-            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            [sys.executable, "-c", f"from {module} import main; main()", *arguments],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
             env={**os.environ, "PYTHONUNBUFFERED": "1"})
         self._reader = threading.Thread(target=self._read)
         self._reader.start()
@@ -75,6 +72,7 @@ class NodeProcess:
         self._process.wait()
         self._reader.join()
         self._process.stdout.close()
+        self._process.stdin.close()
 
     def _read(self):
         for line in self._process.stdout:
@@ -87,6 +85,10 @@ class NodeProcess:
         """All that was printed until now."""
         return "\n".join(self.lines)
 
+    def tell(self, line):
+        """Write a line to the standard input of the program."""
+        print(line, file=self._process.stdin, flush=True)
+
     def wait_for_line(self, text, start=0):
         """Return the first line with this text, from line number `start` on."""
         with self._news:
@@ -95,20 +97,35 @@ class NodeProcess:
             return next(line for line in self.lines[start:] if text in line)
 
     def wait(self):
-        """Return the exit code once the node has ended by itself."""
+        """Return the exit code once the program has ended by itself."""
         try:
             code = self._process.wait(DEADLINE)
         except subprocess.TimeoutExpired:
-            pytest.fail(f"the node does not end:\n{self.log}")
+            pytest.fail(f"it does not end:\n{self.log}")
         self._reader.join()
         return code
 
     def stop(self, number=signal.SIGINT):
-        """Send a signal; the node ends well and tells of no error in its code."""
+        """Send a signal; the program ends well and tells of no error in its code."""
         self._process.send_signal(number)
         assert self.wait() == 0, self.log
         assert "Traceback" not in self.log, self.log
         assert "internal error" not in self.log, self.log
+
+
+class NodeProcess(Process):
+    """A node that runs as its user would run it.
+
+    Args:
+        module: Module whose `main` runs the node.
+        parameters: Values for `-p`.
+        arguments: More ROS arguments, for example "-r", "__ns:=/left".
+    """
+
+    def __init__(self, module, parameters=None, *arguments):
+        for name, value in (parameters or {}).items():
+            arguments += "-p", f"{name}:={json.dumps(value)}"
+        super().__init__(module, "--ros-args", *arguments)
 
 
 class Status(NamedTuple):

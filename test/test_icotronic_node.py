@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import signal
-import socket
 import struct
 import time
 
@@ -358,9 +357,10 @@ def test_the_time_offset_is_added_to_the_stamps(station):
 
 def test_diagnostics_tell_identity_link_rate_and_readings(station):
     status = station.wait_for_status(
-        lambda status: "battery voltage" in status.values and status.level == OK)
+        lambda status: "battery voltage" in status.values
+        and "samples per second, 0 frames lost" in status.message)
+    assert status.level == OK
     assert status.hardware_id == "Test-STH 08:6B:D7:01:DE:81"
-    assert "samples per second, 0 frames lost" in status.message
     values = status.values
     assert values["bus"].startswith("socketcand can0")
     assert values["phase"] == "connected"
@@ -495,7 +495,7 @@ def samples(ros):
     recorder.close()
 
 
-@pytest.mark.parametrize(("channels", "seconds"), [("x", 4.2), ("xyz", 1.5)])
+@pytest.mark.parametrize(("channels", "seconds"), [("x", 3.8), ("xyz", 1.0)])
 def test_every_sample_arrives_with_its_value_and_its_time(
         ros, start, launch, samples, channels, seconds):
     server = start()
@@ -522,7 +522,7 @@ def test_every_sample_arrives_with_its_value_and_its_time(
     assert np.abs(accelerations - truth).max() < STEP
     assert np.diff(stamps).min() > 0
     assert deserialize_message(samples.messages[-1], Imu).header.frame_id == "imu_link"
-    settled = times > times[0] + 3.3
+    settled = times > times[0] + 3.2
     if settled.any():
         assert np.abs(stamps * 1e-9 - times)[settled].max() < 5e-3
         steps = np.diff(stamps[settled]) * 1e-9 * RATE
@@ -759,15 +759,6 @@ def test_a_bus_that_is_not_there_is_told_once_and_waited_for(launch):
     for process, words in cases:
         process.stop()
         assert process.log.count(words) == 1
-
-
-def test_a_server_that_says_nothing_hangs_neither_start_nor_end(launch):
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-        host, port = listener.getsockname()
-        process = launch({"can_interface": "socketcand",
-                          "can_options": [f"host={host}", f"port={port}"]})
-        process.wait_for_line(f"cannot open socketcand can0 at {host}:{port}: no answer")
-        process.stop()
 
 
 def test_a_wrong_parameter_ends_the_start_with_the_reason(launch):

@@ -7,13 +7,15 @@ process: what they measured and lost and what the session made of it can be comp
 from __future__ import annotations
 
 import math
+import socket
 import time
+from types import SimpleNamespace
 
 import can
 import numpy as np
 import pytest
 
-from driver_common import sample_clock, simulated_bus
+from driver_common import can_link, sample_clock, simulated_bus
 from driver_common.device_thread import DeviceThread
 from driver_common.errors import (
     LinkError,
@@ -168,6 +170,7 @@ def impatient(monkeypatch):
     request = Line.request
     monkeypatch.setattr(Line, "request",
                         lambda line, asked, timeout=0.15: request(line, asked, timeout))
+    monkeypatch.setattr(session, "DISCONNECT_TIMEOUT", 0.1)
 
 
 @pytest.fixture
@@ -611,6 +614,20 @@ def test_the_thread_ends_soon_although_nobody_answers(start, serve, impatient):
     assert time.monotonic() - began < 3.0
 
 
+def test_a_server_that_says_nothing_hangs_neither_the_start_nor_the_end(monkeypatch, serve):
+    monkeypatch.setattr(can_link, "CONNECT_TIMEOUT", 0.2)
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        host, port = listener.getsockname()
+        service = serve(SimpleNamespace(host=host, port=port))
+        wait_until(lambda: len(service.states) >= 2)
+        assert {str(error) for error in service.states} == {
+            f"cannot open socketcand can0 at {host}:{port}: no answer; check host and port in "
+            "can_options"}
+        began = time.monotonic()
+        service.thread.stop()
+        assert time.monotonic() - began < 3.0
+
+
 # --- the stream --------------------------------------------------------------------------------
 
 @pytest.fixture
@@ -683,8 +700,8 @@ def test_what_a_bad_radio_loses_is_counted_and_what_arrives_is_true(connect, fau
 def test_the_times_behind_a_gap_are_true(connect, settled):
     host, network, simulated = connect(channels="xyz")
     host.stream(round(settled * RATE / 3))
-    network.faults.loss, network.faults.loss_run = 0.01, 100
-    host.more(1000)
+    network.faults.loss, network.faults.loss_run = 0.02, 100
+    host.more(500)
     network.faults.loss = 0.0
     stream = host.more(300)
     numbers, stamps, _ = stream.samples()
