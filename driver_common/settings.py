@@ -106,9 +106,13 @@ class Parameter:
         minimum, maximum = self.limits
         if minimum is None and maximum is None:
             return ""
-        low = "…" if minimum is None else f"{minimum:.10g}"
-        high = "…" if maximum is None else f"{maximum:.10g}"
-        return f"{low} … {high} {self.unit}".rstrip()
+        if maximum is None:
+            text = f"at least {minimum:.10g}"
+        elif minimum is None:
+            text = f"at most {maximum:.10g}"
+        else:
+            text = f"{minimum:.10g} … {maximum:.10g}"
+        return f"{text} {self.unit}".rstrip()
 
     def _kind_in_words(self) -> str:
         if self.choices is not None:

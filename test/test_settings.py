@@ -67,7 +67,7 @@ def test_a_good_value_comes_back_in_the_parameters_type(
     (LEVEL, "10", "level must be a number, not '10'"),
     (LEVEL, True, "level must be a number, not True"),
     (LEVEL, None, "level must be a number, not None"),
-    (COUNT, 0, "count = 0 is out of range, allowed is 1 … …"),
+    (COUNT, 0, "count = 0 is out of range, allowed is at least 1"),
     (COUNT, 2.5, "count must be a whole number, not 2.5"),
     (COUNT, math.inf, "count must be a whole number, not inf"),
     (COUNT, False, "count must be a whole number, not False"),
@@ -93,8 +93,8 @@ def test_a_setting_error_is_a_value_error() -> None:
 
 @pytest.mark.parametrize(("parameter", "text"), [
     (LEVEL, "-30 … 30 dB"),
-    (Parameter("x", minimum=0.0, unit="m"), "0 … … m"),
-    (Parameter("x", maximum=4294967.295, unit="m"), "… … 4294967.295 m"),
+    (Parameter("x", minimum=0.0, unit="m"), "at least 0 m"),
+    (Parameter("x", maximum=4294967.295, unit="m"), "at most 4294967.295 m"),
     (Parameter("x"), ""),
     (MODE, "fast, slow"),
 ])
