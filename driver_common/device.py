@@ -112,7 +112,7 @@ class Device:
         """Return the wanted values, as the device can hold them, that it does not have yet."""
         wanted = {}
         for name, value in self._options.wanted.items():
-            if name in self.settings:
+            if name in self.settings and value != self.values[name]:
                 try:
                     checked = self.settings[name].check(value)
                 except SettingError as error:

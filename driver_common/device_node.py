@@ -59,7 +59,7 @@ class DeviceNode(LifecycleNode):
         Raises:
             SettingError: One of them has an unacceptable value.
         """
-        super().__init__(name, automatically_declare_parameters_from_overrides=True)
+        super().__init__(name)
         self.store = ParameterStore(self)
         self.bus: Any = None
         self.thread: DeviceThread | None = None

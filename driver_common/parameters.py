@@ -65,14 +65,15 @@ class ParameterStore:
     """
 
     def __init__(self, node: Node) -> None:
-        """Take the overrides, which the node has declared by itself."""
+        """Take the overrides."""
         self._node = node
         self.rows: dict[str, Parameter] = {}
         self.overrides: dict[str, Any] = {}
-        for name, parameter in node.get_parameters_by_prefix("").items():
-            if not name.startswith(("qos_overrides.", "use_sim_time", "start_type_description")):
+        # Not declared by rclpy itself, which fails on an empty list as in "sensors: []".
+        for name, parameter in node._parameter_overrides.items():
+            if parameter.value is not None and not name.startswith(
+                    ("qos_overrides.", "use_sim_time", "start_type_description")):
                 self.overrides[name] = parameter.value
-                node.undeclare_parameter(name)
 
     def declare(self, name: str, row: Parameter, value: Value) -> None:
         """Declare a parameter, or set the value of one that is declared already."""

@@ -13,7 +13,10 @@ from collections import deque
 WINDOW = 1.0  # s of samples that give one earliest arrival
 WINDOWS = 30  # earliest arrivals that the line goes through
 MAX_DEVIATION = 0.02  # of the nominal rate; beyond it an estimate is no clock
-RESTART = 0.5e9  # ns of disagreement that mean another stream or a set clock
+RESTART = 0.5e9  # ns that a frame is too early: another stream, or a clock that was set
+BACKLOG = 10e9  # ns that frames can wait for a host that was busy; beyond it, the same
+LATE = 50e6  # ns of delay in a whole window: they waited, or the clock was set forward
+LATE_WINDOWS = 3  # after so many of them it was the clock
 
 
 class SampleClock:
@@ -38,6 +41,7 @@ class SampleClock:
         self._earliest: deque[tuple[int, int]] = deque(maxlen=WINDOWS)
         self._window_size = max(1, round(WINDOW * 1e9 / self.nominal_period))
         self._window_end = -1
+        self._late_windows = 0
         self._least_delay = 0.0
         self._least_point = (0, 0)
 
@@ -50,9 +54,10 @@ class SampleClock:
         """
         arrival -= self.base
         delay = arrival - (self.origin + number * self.period)
-        if self._least_delay <= delay < RESTART and number < self._window_end:
+        if self._least_delay <= delay < BACKLOG and number < self._window_end:
             return  # like most frames: not the earliest of the window
-        if self._window_end < 0 or not -RESTART < delay < RESTART:
+        if (self._window_end < 0 or self._late_windows == LATE_WINDOWS
+                or not -RESTART < delay < BACKLOG):
             self._start(number, arrival + self.base)
             return
         if number >= self._window_end:
@@ -83,8 +88,12 @@ class SampleClock:
 
     def _end_window(self, number: int) -> None:
         """Fit the line to the earliest arrivals, and begin the next window."""
-        self._earliest.append(self._least_point)
         self._window_end = number + self._window_size
+        if self._least_delay > LATE:
+            self._late_windows += 1
+            return
+        self._late_windows = 0
+        self._earliest.append(self._least_point)
         points = self._earliest
         if len(points) < 2:
             return

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
+from enum import Enum
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -292,8 +293,8 @@ class IcotronicNode(DeviceNode, Listener):
             values |= {f"calibration of channel {channel.name}":
                        f"{channel.slope:.6g} m/s² per step, offset {channel.offset:.6g} m/s², by "
                        f"{channel.source}" for channel in sensor.channels}
-        values |= {name.replace("_", " "): value for name, value in vars(sensor.readings).items()
-                   if value is not None}
+        values |= {name.replace("_", " "): _in_words(value)
+                   for name, value in vars(sensor.readings).items() if value is not None}
         values |= {
             "frames": counts.frames, "lost frames": counts.lost,
             "duplicate frames": counts.duplicates, "damaged frames": counts.damaged,
@@ -369,6 +370,16 @@ def _publisher(serialise: Callable[[int, float, float, float], bytes],
 def _identity(title: str, identity: UnitIdentity) -> dict[str, object]:
     return {f"{title}: {name.replace('_', ' ')}": value for name, value in vars(identity).items()
             if value not in (None, "")}
+
+
+def _in_words(value: object) -> object:
+    """Return a status or a pair of counters for people, any other value as it is."""
+    fields = value._asdict() if hasattr(value, "_asdict") else getattr(value, "__dict__", None)
+    if not fields or isinstance(value, Enum):
+        return value
+    return ", ".join(f"{name.replace('_', ' ')}: {part.name.lower()}" if isinstance(part, Enum)
+                     else f"{name.replace('_', ' ')}: {part}"
+                     for name, part in fields.items() if part is not None)
 
 
 def _changes(changes: Mapping[Field, tuple[FieldValue, FieldValue]]) -> str:

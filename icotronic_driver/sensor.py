@@ -28,8 +28,6 @@ from icotronic_driver.streaming import (
     stream_format,
 )
 
-NO_CALIBRATION = Calibration(0.0, 0.0)
-
 
 class Phase(Enum):
     """Where the sensor is on its way to a stream."""

@@ -404,7 +404,7 @@ class IcotronicBus:
     def _apply_sample_rate(self) -> None:
         """Turn the wanted sample rate into settings of the ADC."""
         sensor = self.sensor
-        if sensor.options.sample_rate:
+        if sensor.options.sample_rate and sensor.options.config_mode != "leave":
             total = sensor.options.sample_rate * sensor.format.channel_count
             adc = nearest_adc_configuration(total, sensor.adc.reference_voltage)
             sensor.options.wanted |= {

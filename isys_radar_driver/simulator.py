@@ -449,6 +449,8 @@ class SimulatedRadar:
         for pattern, value in _FACTORY:
             if fnmatch.fnmatch(setting.name, pattern):
                 return setting.encode(setting.limits[1] if value == math.inf else value)
+        if setting.choices is not None:
+            return next(iter(setting.choices.values()))
         return setting.encode(setting.minimum) if setting.minimum is not None else 0
 
     _HANDLERS: ClassVar[dict[int, Callable[[SimulatedRadar, bytes, float], bytes]]] = {

@@ -77,8 +77,9 @@ class Master:
             time.sleep(min(self.bus.poll(), 0.02))
 
     def find(self):
-        """Poll until every radar is found."""
+        """Poll until every radar is found; that one was not at once is forgotten."""
         self.until(lambda: all(radar.identity for radar in self.bus.devices))
+        self.heard.lost.clear()
         return self
 
     def measure(self, count=1):

@@ -41,6 +41,7 @@ from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
 DEADLINE = 15.0  # s; far more than anything takes, also on a busy machine
+OFTEN = "import driver_common.diagnostics as d; d.PERIOD = 0.1"  # s; the tests wait for them
 TRANSITIONS = {
     "configure": Transition.TRANSITION_CONFIGURE, "cleanup": Transition.TRANSITION_CLEANUP,
     "activate": Transition.TRANSITION_ACTIVATE, "deactivate": Transition.TRANSITION_DEACTIVATE}
@@ -52,13 +53,14 @@ class Process:
     Args:
         module: Module whose `main` is the program.
         arguments: Its arguments.
+        before: Code to run before.
     """
 
-    def __init__(self, module, *arguments):
+    def __init__(self, module, *arguments, before=""):
         self.lines = []
         self._news = threading.Condition()
         self._process = subprocess.Popen(
-            [sys.executable, "-c", f"from {module} import main; main()", *arguments],
+            [sys.executable, "-c", f"{before}\nfrom {module} import main; main()", *arguments],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
             env={**os.environ, "PYTHONUNBUFFERED": "1"})
         self._reader = threading.Thread(target=self._read)
@@ -114,7 +116,7 @@ class Process:
 
 
 class NodeProcess(Process):
-    """A node that runs as its user would run it.
+    """A node that runs as its user would run it, but for diagnostics that come more often.
 
     Args:
         module: Module whose `main` runs the node.
@@ -125,7 +127,7 @@ class NodeProcess(Process):
     def __init__(self, module, parameters=None, *arguments):
         for name, value in (parameters or {}).items():
             arguments += "-p", f"{name}:={json.dumps(value)}"
-        super().__init__(module, "--ros-args", *arguments)
+        super().__init__(module, "--ros-args", *arguments, before=OFTEN)
 
 
 class Status(NamedTuple):

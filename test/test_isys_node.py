@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import signal
@@ -14,6 +15,7 @@ from nodes import NodeProcess, Ros
 from sensor_msgs.msg import PointCloud2, Range, Temperature
 from std_msgs.msg import Float32MultiArray
 
+from driver_common import diagnostics
 from isys_radar_driver.commands import READ_APPLICATION, Location
 from isys_radar_driver.models import find_model
 from isys_radar_driver.node import IsysRadarNode
@@ -116,26 +118,48 @@ def wait_for_points(remote, condition=lambda cloud: cloud.width):
 
 # --- parameters are the device -----------------------------------------------------------------
 
+@pytest.fixture(scope="module")
+def of_each_kind():
+    """Return a function that gives the station of a model; they are kept for the module."""
+    with contextlib.ExitStack() as stack:
+        lab, stations = stack.enter_context(Lab()), {}
+
+        def get(model):
+            if model not in stations:
+                ros = stack.enter_context(Ros())
+                line, radar = lab.start(model, baud_rate=FAST_LINE)
+                name = model.replace("-", "_")
+                process = stack.enter_context(NodeProcess(
+                    MODULE, {"serial_port": line.port, "serial_baud": FAST_LINE},
+                    "-r", f"__node:={name}"))
+                process.wait_for_line("connected to")
+                stations[model] = Station(ros, f"/{name}", process, line, radar)
+                settings = settings_of(radar.model).keys()
+                ros.wait_until(lambda: settings <= stations[model].remote.names())
+            return stations[model]
+
+        yield get
+        for station in stations.values():
+            station.process.stop()
+
+
 @pytest.mark.parametrize("model", ["iSYS-4001", "iSYS-5110", "iSYS-6005"])
-def test_the_parameters_are_those_of_the_model_with_what_it_reported(station, model):
-    here = station(model)
+def test_the_parameters_are_those_of_the_model_with_what_it_reported(of_each_kind, model):
+    here = of_each_kind(model)
     settings = settings_of(find_model(model))
     options = {option.name for option in (*IsysRadarNode.bus_options(),
                                           *IsysRadarNode.SENSOR_OPTIONS)}
-    names = here.ros.wait_until(
-        lambda: settings.keys() <= here.remote.names() and here.remote.names())
-    of_ros = ("use_sim_time", "start_type_description_service")
-    assert {name for name in names if not name.startswith(("qos_overrides.", *of_ros))
+    of_ros = ("qos_overrides.", "use_sim_time", "start_type_description_service")
+    assert {name for name in here.remote.names() if not name.startswith(of_ros)
             } == settings.keys() | options
     values = dict(zip(settings, here.remote.get(*settings), strict=True))
     assert values == {name: here.radar.value(name) for name in settings}
 
 
 @pytest.mark.parametrize("model", ["iSYS-4001", "iSYS-5110", "iSYS-6005"])
-def test_descriptors_say_what_the_rows_say(station, model):
-    here = station(model)
+def test_descriptors_say_what_the_rows_say(of_each_kind, model):
+    here = of_each_kind(model)
     settings = settings_of(find_model(model))
-    here.ros.wait_until(lambda: settings.keys() <= here.remote.names())
     for setting, descriptor in zip(settings.values(), here.remote.describe(*settings),
                                    strict=True):
         assert descriptor.description.startswith(setting.description)
@@ -213,10 +237,8 @@ def test_a_parameter_cannot_be_deleted(shared):
     assert "output1.range_max must be a number" in result.reason
 
 
-def test_a_setting_that_can_only_be_read_is_not_set(station):
-    here = station("iSYS-6005")
-    here.ros.wait_until(lambda: "measurement_mode" in here.remote.names())
-    result = here.remote.set("measurement_mode", "fast")
+def test_a_setting_that_can_only_be_read_is_not_set(of_each_kind):
+    result = of_each_kind("iSYS-6005").remote.set("measurement_mode", "fast")
     assert not result.successful
     assert "measurement_mode can be read only" in result.reason
 
@@ -430,9 +452,8 @@ def test_a_setting_of_a_radar_that_was_never_there_says_so(ros, launch):
     assert process.log.count("/dev/ttyMissing") == 1  # however often it was tried
 
 
-def test_a_resolution_that_the_model_lacks_is_refused(station):
-    here = station("iSYS-6005")
-    here.ros.wait_until(lambda: "measurement_mode" in here.remote.names())
+def test_a_resolution_that_the_model_lacks_is_refused(of_each_kind):
+    here = of_each_kind("iSYS-6005")
     result = here.remote.set("target_list_resolution", "16")
     assert not result.successful
     assert "iSYS-6005 has no target lists of 16 bit" in result.reason
@@ -651,6 +672,10 @@ def test_the_address_is_changed_on_purpose_and_followed(station):
 
 # --- diagnostics -------------------------------------------------------------------------------
 
+def test_diagnostics_come_once_a_second():
+    assert diagnostics.PERIOD == 1.0
+
+
 def test_diagnostics_of_a_healthy_radar(shared):
     status = shared.ros.wait_for_status(
         "shared: radar", lambda status: status.level == OK
@@ -858,6 +883,23 @@ def test_the_qos_of_a_topic_can_be_overridden(station):
         lambda: here.ros.node.get_publishers_info_by_topic("/isys_radar/points"))
     assert publisher.qos_profile.reliability.name == "BEST_EFFORT"
     here.process.stop()
+
+
+def test_a_node_started_with_the_parameters_it_had_has_nothing_to_tell(
+        station, launch, tmp_path):
+    here = station("iSYS-6203", {"output1.range_max": 12.0})
+    here.process.wait_for_line("wrote")
+    here.ros.wait_until(lambda: "mounting_offset" in here.remote.names())
+    names = list(here.remote.names())
+    values = {name: list(value) if name == "sensors" else value  # an empty list
+              for name, value in zip(names, here.remote.get(*names), strict=True)}
+    here.process.stop()
+    process = launch(None, *parameter_file(
+        tmp_path, json.dumps({"isys_radar": {"ros__parameters": values}})))
+    process.wait_for_line("connected to")
+    wait_for_points(here.remote)
+    process.stop()
+    assert len(process.lines) == 1
 
 
 def test_parameters_can_be_given_as_in_the_example_file(station, tmp_path):

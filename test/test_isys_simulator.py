@@ -306,6 +306,13 @@ def test_the_measurement_mode_sets_cycle_time_and_number_of_targets(mode, cycle_
 # --- what it measures --------------------------------------------------------------------------
 
 @pytest.mark.parametrize("name", MODELS)
+def test_factory_settings_are_allowed_values(name):
+    radar = SimulatedRadar(find_model(name))
+    for setting in radar.settings.values():
+        assert setting.check(radar.value(setting.name)) == radar.value(setting.name)
+
+
+@pytest.mark.parametrize("name", MODELS)
 def test_the_truth_moves_smoothly_within_what_the_model_reports(name):
     model = find_model(name)
     scene = scene_of(model)

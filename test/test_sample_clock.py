@@ -80,6 +80,21 @@ def test_a_clock_that_was_set_starts_anew():
     assert max(map(abs, off)) < 1000
 
 
+def test_what_waited_for_a_busy_host_keeps_its_time():
+    clock = SampleClock(RATE)
+    off = errors(stream(clock, 6, lambda n: max(0, 2e9 - (n - 20_000) / RATE * 1e9)
+                        if n > 20_000 else 0))
+    assert max(map(abs, off)) < 1_000_000
+
+
+def test_a_clock_that_was_set_by_some_seconds_is_followed():
+    clock = SampleClock(RATE)
+    list(stream(clock, 3, lambda n: 0))
+    later = START + 3 * 10**9 + 5 * 10**9
+    off = errors(stream(clock, 8, lambda n: 0, first=int(3 * RATE), start=later), after=0.6)
+    assert max(map(abs, off)) < 1000
+
+
 def test_a_late_first_frame_is_corrected_by_the_first_early_one():
     clock = SampleClock(RATE)
     off = errors(stream(clock, 1, lambda n: 50e6 if n < 300 else 0), after=0.1)
