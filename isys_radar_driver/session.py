@@ -526,6 +526,10 @@ class RadarBus:
             for baud_rate in dict.fromkeys((*self._baud_candidates(radar), *BAUD_RATES)):
                 link.baud_rate = baud_rate
                 frames = self.line.broadcast(commands.READ_ADDRESS.request(BROADCAST))
+                if frames and baud_rate in self._baud_candidates(radar) and (
+                        radar.options.address in (BROADCAST, frames[0].source)):
+                    return ("; it answers only some requests: check the wiring (termination, "
+                            "length, ground)")
                 if frames:
                     return (f", but a sensor answers at address {frames[0].source} and "
                             f"{baud_rate} Bd; correct the parameters address and serial_baud")

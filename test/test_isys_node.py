@@ -93,8 +93,8 @@ def running():
 
 @pytest.fixture
 def shared(running):
-    """The shared station, with factory settings."""
-    assert running.remote.trigger("restore_factory_settings").success
+    """The shared station, with factory settings; a busy machine may have to find it again."""
+    running.ros.wait_until(lambda: running.remote.trigger("restore_factory_settings").success)
     yield running
     running.ros.forget()
 

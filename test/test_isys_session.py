@@ -115,6 +115,14 @@ def test_a_wrong_baud_rate_is_named_with_the_right_one(start):
     assert "serial_baud" in str(error)
 
 
+def test_a_radar_that_answers_only_some_requests_is_named(start):
+    line, _ = start("iSYS-4001")
+    line.faults = Script(lambda due, reply: [] if function_code(reply) == 0xD0 else [(due, reply)])
+    error = Master(line.port, baud_rate=115200).lose()
+    assert f"no answer on {line.port} at 115200 Bd; it answers only some requests" in str(error)
+    assert "check the wiring" in str(error)
+
+
 def test_without_an_answer_the_user_is_told_what_to_check(start):
     line, simulated = start("iSYS-4001")
     simulated.silent = True
