@@ -22,8 +22,8 @@ from rclpy.subscription import Subscription
 from sensor_msgs.msg import Imu
 
 from bench.measure import Cost, Failure, Process, Row, in_turn
-from icotronic_driver.commands import AdcConfiguration
 from icotronic_driver.settings import nearest_adc_configuration
+from icotronic_driver.values import AdcConfiguration
 
 SENSOR_RATE = AdcConfiguration().sample_rate  # values/s
 VALUES_PER_FRAME = 3

@@ -44,25 +44,60 @@ class Device:
     """What is known of a device; the session of a driver fills it.
 
     Attributes:
+        options: How it is to be used.
         settings: The settings that it has, by name.
         values: The values that it reported, by name.
         differing: Settings which are not as wanted: name to (wanted, reported).
         unsaved: Settings that this driver changed and that were not saved since.
-        error: Why it is not connected.
+        enabled: Whether it is to measure, as far as the user of the services says.
+        error: What is wrong with it; why it is not connected.
+        misses: Number of steps without a good answer.
+        connections: How often it was found.
         backoff: Pauses between attempts to find it.
         due: Monotonic time in s of its next step.
+        served: Monotonic time in s of its last step.
     """
+
+    KIND = "sensor"  # what it is called where it has no name
 
     def __init__(self, options: DeviceOptions) -> None:
         """Begin as an unknown device."""
-        self._options = options
+        self.options = options
         self.settings: dict[str, Setting] = {}
         self.values: dict[str, Value] = {}
         self.differing: dict[str, tuple[Value, Value]] = {}
         self.unsaved: set[str] = set()
+        self.enabled = True
         self.error: DriverError | None = None
+        self.misses = 0
+        self.connections = 0
         self.backoff = Backoff()
         self.due = 0.0
+        self.served = 0.0
+
+    def __str__(self) -> str:
+        """Return what it is called in messages."""
+        return self.title
+
+    @property
+    def title(self) -> str:
+        """Its name on a bus with several, else what it is."""
+        return self.options.name or self.KIND
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether it was found, identified and configured."""
+        raise NotImplementedError
+
+    def forget(self) -> None:
+        """Take note that it is not connected any more."""
+        self.misses = 0
+
+    @property
+    def differences(self) -> dict[str, str]:
+        """Settings which are not as wanted, for the diagnostics."""
+        return {f"{name} differs": f"wanted {wanted}, reported {reported}"
+                for name, (wanted, reported) in dict(self.differing).items()}
 
     def read_all(self, access: RecordAccess, settings: Mapping[str, Setting], note: Note) -> None:
         """Read all settings; those that the device refuses to tell are not offered."""
@@ -84,7 +119,7 @@ class Device:
         """Write settings, all or none, and return what the device reports; see `write_settings`."""
         reported = write_settings(access, self.settings, changes)
         self.unsaved |= {name for name in changes if reported[name] != self.values.get(name)}
-        self._options.wanted |= reported
+        self.options.wanted |= reported
         self.values |= reported
         for name in changes:
             self.differing.pop(name, None)
@@ -99,9 +134,9 @@ class Device:
         """
         self.differing = {}
         wanted = self._missing(note)
-        if self._options.config_mode == "push":
+        if self.options.config_mode == "push":
             self._push(wanted, write, note)
-        elif self._options.config_mode == "check":
+        elif self.options.config_mode == "check":
             self.differing |= {name: (value, self.values[name]) for name, value in wanted.items()}
         for name, (value, reported) in self.differing.items():
             setting = self.settings[name]
@@ -111,7 +146,7 @@ class Device:
     def _missing(self, note: Note) -> dict[str, Value]:
         """Return the wanted values, as the device can hold them, that it does not have yet."""
         wanted = {}
-        for name, value in self._options.wanted.items():
+        for name, value in self.options.wanted.items():
             if name in self.settings and value != self.values[name]:
                 try:
                     checked = self.settings[name].check(value)

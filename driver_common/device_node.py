@@ -5,13 +5,14 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from functools import partial
+from typing import Any, Protocol
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticStatus
 from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.qos_overriding_options import QoSOverridingOptions
@@ -38,6 +39,13 @@ COMMON_OPTIONS = (
 )
 
 
+class Simulator(Protocol):
+    """Simulated devices on a real transport."""
+
+    def close(self) -> None:
+        """End them."""
+
+
 class DeviceNode(LifecycleNode):
     """A driver: a bus with one or more devices.
 
@@ -46,6 +54,7 @@ class DeviceNode(LifecycleNode):
     Attributes:
         bus: The session; None while the node is not configured.
         thread: The thread that serves it.
+        simulator: What `make_bus` started to have something to talk to.
     """
 
     SEVERAL_SENSORS = True  # whether the bus can have more than one
@@ -63,6 +72,7 @@ class DeviceNode(LifecycleNode):
         self.store = ParameterStore(self)
         self.bus: Any = None
         self.thread: DeviceThread | None = None
+        self.simulator: Simulator | None = None
         self._bus_error: DriverError | None = None
         self._diagnostics = diagnostics.Diagnostics(self)
         self._devices: dict[str, Any] = {}
@@ -79,10 +89,15 @@ class DeviceNode(LifecycleNode):
 
     def make_interfaces(self, sensor: str) -> None:
         """Create the publishers and services of a sensor that do not depend on its model."""
-        raise NotImplementedError
+        for name, enabled in (("start_acquisition", True), ("stop_acquisition", False)):
+            self.add_trigger(sensor, name, partial(self._enable, sensor, enabled))
 
     def add_device_interfaces(self, device: Any) -> None:
         """Create the publishers that depend on what the device is."""
+
+    def describe(self, device: Any) -> str:
+        """Return what was found, for the log."""
+        raise NotImplementedError
 
     def status_of(self, device: Any) -> DiagnosticStatus:
         """Return the diagnostics of a device."""
@@ -93,9 +108,6 @@ class DeviceNode(LifecycleNode):
 
     def apply_options(self) -> None:
         """Hand live options to the bus after a change."""
-
-    def release(self) -> None:
-        """Close what `make_bus` opened beside the bus."""
 
     # --- parameters ---
 
@@ -289,10 +301,53 @@ class DeviceNode(LifecycleNode):
                 if self.bus is not None:
                     self.get_logger().error(str(error))
             except Exception as error:  # an exception here would end the node
-                self.get_logger().error(f"internal error, please report it: {error!r}")
+                if self.context.ok():  # else it was shut down meanwhile
+                    self.get_logger().error(f"internal error, please report it: {error!r}")
 
         if self.executor is not None:
             self.executor.create_task(guarded)
+
+    def device(self, sensor: str) -> Any:
+        """Return the device of a sensor; the node is configured."""
+        return next(device for device in self.bus.devices if device.options.name == sensor)
+
+    def _enable(self, sensor: str, enabled: bool) -> str:
+        self.call(lambda: self.bus.set_enabled(self.device(sensor), enabled))
+        return f"acquisition {'started' if enabled else 'stopped'}"
+
+    def give_address(self, sensor: str, give: Callable[[int], object]) -> str:
+        """Run `give` with the parameter new_address; return what the user is told then."""
+        prefix = self.prefix(sensor)
+        address = self.option("new_address", sensor)
+        if not address:
+            raise SettingError(f"set the parameter {prefix}new_address first")
+        old = self.device(sensor).address
+        self.call(lambda: give(address))
+        self.store.store({prefix + "address": address, prefix + "new_address": 0})
+        return (f"the sensor moved from address {old} to {address} and keeps it; put "
+                f"'{prefix}address: {address}' into your parameter file")
+
+    # --- what the bus reports, in its thread ---
+
+    def on_found(self, device: Any) -> None:
+        """Show the device's settings as parameters."""
+        self.get_logger().info(f"{device.title}: connected to {self.describe(device)}")
+        self.show_settings(device.options.name, device)
+
+    def on_values(self, device: Any) -> None:
+        """Show the values that were read again."""
+        self.show_settings(device.options.name, device)
+
+    def on_lost(self, device: Any, error: DriverError) -> None:
+        """Log why there is no device."""
+        self.get_logger().error(f"{device.title}: {error} (waiting for it)")
+
+    def on_note(self, device: Any, text: str, *, warning: bool = False) -> None:
+        """Log a line."""
+        if warning:  # rclpy takes one severity per line of code only
+            self.get_logger().warning(f"{device.title}: {text}")
+        else:
+            self.get_logger().info(f"{device.title}: {text}")
 
     def on_bus_state(self, error: DriverError | None) -> None:
         """Take note that the link opened or failed; one line in the log per change."""
@@ -430,7 +485,7 @@ class DeviceNode(LifecycleNode):
     def _close(self) -> None:
         if self.thread is not None:
             self.thread.stop()
-        self.release()
+        self._close_simulator()
         self.thread = None
         self.bus = None
         self._bus_error = None
@@ -444,15 +499,21 @@ class DeviceNode(LifecycleNode):
         """Leave the devices stopped and the port closed."""
         if self.thread is not None:
             self.thread.stop()
-        self.release()
+        self._close_simulator()
         super().destroy_node()
+
+    def _close_simulator(self) -> None:
+        if self.simulator is not None:
+            self.simulator.close()
+            self.simulator = None
 
 
 def run(make_node: Callable[[], DeviceNode], args: Sequence[str] | None = None) -> int:
     """Run a driver until it is told to stop; return the exit code of the process."""
-    node = None
+    node = context = None
     try:
         rclpy.init(args=args)
+        context = rclpy.get_default_context()
         node = make_node()
         executor = SingleThreadedExecutor()
         executor.add_node(node)
@@ -461,14 +522,14 @@ def run(make_node: Callable[[], DeviceNode], args: Sequence[str] | None = None) 
                 return 1
             node.trigger_activate()
         executor.spin()
-    except (KeyboardInterrupt, ExternalShutdownException):
+    except KeyboardInterrupt:
         pass
     except DriverError as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
-    except rclpy.exceptions.ROSInterruptException:
-        pass
     except Exception as error:
+        if context is not None and not context.ok():
+            return 0  # a signal came, perhaps in the midst of publishing
         if node is None and isinstance(error, _ArgumentErrors):
             print(f"error: {str(error).splitlines()[0]}", file=sys.stderr)
             return 1

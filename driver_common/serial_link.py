@@ -7,6 +7,7 @@ import errno
 import os
 import socket
 import termios
+import time
 
 import serial
 from serial.tools import list_ports
@@ -15,6 +16,8 @@ from driver_common.errors import LinkError
 
 BITS_PER_BYTE = 10  # 8N1
 WRITE_TIMEOUT = 1.0  # s
+HELD_UP = 0.02  # s by which a wait may be too long before the host counts as held up
+GRACE = 1.0  # s that are waited once more after that, at most
 _ADVICE = {
     errno.ENOENT: "there is no such port{ports}; is it plugged in?",
     errno.EACCES: "no permission; add yourself to the group dialout with "
@@ -80,18 +83,29 @@ class SerialLink:
             self._serial.write(data)
 
     def read(self, timeout: float) -> bytes:
-        """Return what has arrived; wait up to `timeout` s for the first byte, else b""."""
+        """Return what has arrived; wait up to `timeout` s for the first byte, else b"".
+
+        A busy or paused host may have held up adapter, network or simulator as well: the time that
+        it took from us is waited once more.
+        """
         with _Guard(self.port):
             waiting = self._serial.in_waiting
-            if not waiting:
-                self._serial.timeout = max(timeout, 0)
-                first: bytes = self._serial.read(1)
-                if not first:
-                    return b""
-                waiting = self._serial.in_waiting
-                return first + (self._serial.read(waiting) if waiting else b"")
-            data: bytes = self._serial.read(waiting)
-            return data
+            if waiting:
+                data: bytes = self._serial.read(waiting)
+                return data
+            first = self._first_byte(max(timeout, 0))
+            waiting = self._serial.in_waiting if first else 0
+            return first + (self._serial.read(waiting) if waiting else b"")
+
+    def _first_byte(self, timeout: float) -> bytes:
+        start = time.monotonic()
+        self._serial.timeout = timeout
+        first: bytes = self._serial.read(1)
+        held_up = time.monotonic() - start - timeout
+        if not first and timeout and held_up > HELD_UP:
+            self._serial.timeout = min(held_up, GRACE)
+            first = self._serial.read(1)
+        return first
 
     def close(self) -> None:
         """Close the port; it may be gone already."""

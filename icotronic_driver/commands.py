@@ -12,18 +12,38 @@ import inspect
 import math
 import struct
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass, field
-from enum import IntEnum
-from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
+from dataclasses import dataclass
+from typing import Any, TypeVar
 
-from driver_common.errors import FrameError, RefusedError, SettingError
+from driver_common.errors import FrameError, SettingError
 from driver_common.settings import Raw, Record, suggestion
-from icotronic_driver.identifier import SPU_1, STH_1, Frame, Identifier, node_name
+from icotronic_driver.identifier import SPU_1, STH_1, Identifier
+from icotronic_driver.request import Command, Request
 from icotronic_driver.streaming import STOP, StreamFormat, decode_single
+from icotronic_driver.values import (
+    AdcConfiguration,
+    CalibrationElement,
+    CalibrationMethod,
+    CodeLocation,
+    EnergyTimes,
+    ErrorStatus,
+    NetworkState,
+    NodeStatus,
+    OperatingTime,
+    PowerCycles,
+    Signal,
+    State,
+    UsedSensors,
+    Version,
+    decode_mac,
+    decode_text,
+    encode_mac,
+    encode_text,
+    reference_code,
+    unpack_exactly,
+)
 
-P = ParamSpec("P")
 T = TypeVar("T")
-Result = TypeVar("Result")
 
 SYSTEM, STREAMING, STATISTICS = 0x00, 0x04, 0x08
 CONFIGURATION, EEPROM, PRODUCT_DATA, TEST = 0x28, 0x3D, 0x3E, 0x3F
@@ -31,217 +51,18 @@ CONFIGURATION, EEPROM, PRODUCT_DATA, TEST = 0x28, 0x3D, 0x3E, 0x3F
 SELF = 0xFF  # device number: the node itself, not one that it sees
 NAME_LENGTH, FIRST_PART = 8, 6  # bytes of a name, and how many the first frame carries
 EEPROM_CHUNK = 4  # errata C10
-CLOCK = 38.4e6  # Hz, of the ADC
 ADVERTISEMENT_STEP = 0.625e-3  # s
 TEMPERATURE_REFERENCE = 1.25  # V; with it the temperature comes in m°C
 
-ERRORS = {0: "specific error", 1: "not available", 2: "general error", 3: "write not allowed",
-          4: "unsupported format", 5: "wrong key or magic number",
-          6: "no super frame inside a super frame"}  # section 10.9
 _STATE_REASONS = {1: "set state not available", 2: "wrong subscriber"}  # section 10.2.3.1
-
-
-# --- values ---
-
-class NetworkState(IntEnum):
-    """State of a node in the network (sections 10.2.3.1 and 10.2.4)."""
-
-    FAILURE = 0
-    ERROR = 1
-    STANDBY = 2
-    GRACEFUL_DEGRADATION_2 = 3
-    GRACEFUL_DEGRADATION_1 = 4
-    OPERATING = 5
-    STARTUP = 6
-    NO_CHANGE = 7
-
-
-class CodeLocation(IntEnum):
-    """Which program of a node runs (section 10.2.3.1)."""
-
-    NO_CHANGE = 0
-    BOOTLOADER = 1
-    APPLICATION = 2
-    RESERVED = 3
-
-
-class State(NamedTuple):
-    """What a node runs, and in which state."""
-
-    location: CodeLocation
-    state: NetworkState
-
-
-@dataclass(frozen=True)
-class NodeStatus:
-    """Node status word (section 10.2.4); what only a stationary unit has is None for a sensor."""
-
-    error: bool
-    state: NetworkState
-    radio_enabled: bool | None = None
-    can_enabled: bool | None = None
-    radio_connected: bool | None = None
-
-
-@dataclass(frozen=True)
-class ErrorStatus:
-    """Error status word (section 10.2.5); transmission is Bluetooth for a sensor, else CAN."""
-
-    transmission_failed: bool
-    adc_overrun: bool | None = None
-
-
-class EnergyTimes(NamedTuple):
-    """Times of an energy mode in s: until it begins, and between two advertisements in it."""
-
-    sleep: float
-    advertisement: float
-
-
-class PowerCycles(NamedTuple):
-    """How often the power was switched on (resets count as well) and lost."""
-
-    on: int
-    off: int
-
-
-class OperatingTime(NamedTuple):
-    """Operating time in s."""
-
-    since_reset: int
-    since_first_power_on: int
-
-
-class Version(NamedTuple):
-    """Version of hardware or firmware."""
-
-    major: int
-    minor: int
-    patch: int
-
-    def __str__(self) -> str:
-        """Return for example "2.1.10"."""
-        return f"{self.major}.{self.minor}.{self.patch}"
-
-
-class UsedSensors(NamedTuple):
-    """Numbers of the sensors on the three channels; 0 in a write leaves the channel as it is."""
-
-    x: int
-    y: int
-    z: int
-
-
-class CalibrationElement(IntEnum):
-    """What a calibration factor or measurement belongs to (sections 10.5.3.1 and 10.5.5.1)."""
-
-    ACCELERATION = 0
-    TEMPERATURE = 1
-    VOLTAGE = 32
-    GROUND = 96
-    SUPPLY = 97
-    REGULATED_POWER = 98
-    AMPLIFIER_OUTPUT = 99
-
-
-class CalibrationMethod(IntEnum):
-    """What a calibration measurement does (section 10.5.5.1)."""
-
-    RESERVED = 0
-    ACTIVATE = 1
-    DEACTIVATE = 2
-    MEASURE = 3
-
-
-class Signal(NamedTuple):
-    """A test signal: shape 1 is a line, 2 a ramp (section 10.8.1)."""
-
-    shape: int
-    module: int
-    content: bytes
-
-
-ACQUISITION_TIMES = (1, 2, 3, 4, 8, 16, 32, 64, 128, 256)  # cycles, by code
-OVERSAMPLING_RATES = tuple(1 << code for code in range(13))  # by code
-REFERENCE_STEP = 0.05  # V
-REFERENCE_VOLTAGES = (1.25, 1.65, 1.8, 2.1, 2.2, 2.5, 2.7, 3.3, 5.0, 6.6)
-PRESCALERS = range(1, 128)
-
-
-@dataclass(frozen=True)
-class AdcConfiguration:
-    """How the ADC samples (section 10.5.1); the default is what it has after a reset.
-
-    Attributes:
-        prescaler: Divider of the clock, 1 … 127.
-        acquisition_time: Clock cycles in which the signal is taken, one of `ACQUISITION_TIMES`.
-        oversampling_rate: Conversions that make a value, one of `OVERSAMPLING_RATES`.
-        reference_voltage: In V, one of `REFERENCE_VOLTAGES`.
-    """
-
-    prescaler: int = 2
-    acquisition_time: int = 8
-    oversampling_rate: int = 64
-    reference_voltage: float = 3.3
-
-    @property
-    def sample_rate(self) -> float:
-        """Values per s, shared by the active channels (section 10.5.1.1.1)."""
-        return CLOCK / ((self.prescaler + 1) * (self.acquisition_time + 13)
-                        * self.oversampling_rate)
-
-    def encode(self) -> bytes:
-        """Return the four codes.
-
-        Raises:
-            SettingError: The ADC has no such value.
-        """
-        _require("prescaler", self.prescaler, PRESCALERS)
-        _require("acquisition time", self.acquisition_time, ACQUISITION_TIMES)
-        _require("oversampling rate", self.oversampling_rate, OVERSAMPLING_RATES)
-        return bytes((self.prescaler, ACQUISITION_TIMES.index(self.acquisition_time),
-                      OVERSAMPLING_RATES.index(self.oversampling_rate),
-                      _reference_code(self.reference_voltage)))
-
-    @classmethod
-    def decode(cls, data: bytes) -> AdcConfiguration:
-        """Return what four codes say.
-
-        Raises:
-            FrameError: A code means nothing.
-        """
-        prescaler, acquisition, oversampling, reference = _exactly(data, "BBBB")
-        try:
-            return cls(prescaler, ACQUISITION_TIMES[acquisition], OVERSAMPLING_RATES[oversampling],
-                       reference / 20)
-        except IndexError:
-            raise FrameError(f"ADC configuration {data.hex(' ').upper()} makes no sense") from None
-
-
-def _reference_code(voltage: float) -> int:
-    _require("reference voltage", voltage, REFERENCE_VOLTAGES)
-    return round(voltage / REFERENCE_STEP)
-
-
-def _require(what: str, value: float, allowed: Sequence[float]) -> None:
-    if value not in allowed:
-        shown = (f"{allowed[0]} … {allowed[-1]}" if isinstance(allowed, range)
-                 else ", ".join(f"{one:g}" for one in allowed))
-        raise SettingError(f"the ADC has no {what} {value:g}, allowed is {shown}")
 
 
 # --- bytes in and out ---
 
-def _exactly(data: bytes, form: str) -> tuple[int, ...]:
-    size = struct.calcsize(form)
-    if len(data) != size:
-        raise FrameError(f"answer carries {len(data)} bytes instead of {size}: "
-                         f"{data.hex(' ').upper()}")
-    return struct.unpack(form, data)
 
 
 def _bytes(data: bytes) -> bytes:
-    _exactly(data, "8s")
+    unpack_exactly(data, "8s")
     return bytes(data)
 
 
@@ -257,140 +78,9 @@ def _empty() -> bytes:
     return b""
 
 
-def decode_text(data: bytes) -> str:
-    """Return the text in bytes that are padded with zeros (errata C13)."""
-    return data.split(b"\0", 1)[0].decode("utf-8", errors="replace")
 
 
-def encode_text(text: str, length: int) -> bytes:
-    """Return a text as UTF-8, padded with zeros (errata C13).
 
-    Raises:
-        SettingError: The text is too long or holds a zero.
-    """
-    data = text.encode()
-    if len(data) > length or b"\0" in data:
-        raise SettingError(f'"{text}" does not fit, it may have at most {length} bytes in UTF-8 '
-                           "and no zero")
-    return data.ljust(length, b"\0")
-
-
-def encode_mac(address: str) -> bytes:
-    """Return the six bytes of a MAC address like "08:6B:D7:01:DE:81".
-
-    Raises:
-        SettingError: Not a MAC address.
-    """
-    parts = address.replace("-", ":").split(":")
-    try:
-        if len(parts) == 6 and all(len(part) == 2 for part in parts):
-            return bytes(int(part, 16) for part in parts)
-    except ValueError:
-        pass
-    raise SettingError(f'"{address}" is not a MAC address such as 08:6B:D7:01:DE:81')
-
-
-def decode_mac(data: bytes) -> str:
-    """Return the text of six bytes, like "08:6B:D7:01:DE:81"."""
-    return data.hex(":").upper()
-
-
-# --- the row ---
-
-@dataclass(frozen=True)
-class Request(Generic[T]):
-    """A request on its way.
-
-    Attributes:
-        name: What it asks for, in words.
-        frame: What is to be sent.
-        mask: Which bits of the request's first bytes the acknowledgement repeats.
-        decode: Turns the acknowledgement's payload into the result; raises FrameError.
-        reasons: Numbers of specific errors in words.
-    """
-
-    name: str
-    frame: Frame
-    mask: bytes
-    decode: Callable[[bytes], T]
-    reasons: Mapping[int, str] = field(default_factory=dict)
-
-    @property
-    def acknowledgement_id(self) -> int:
-        """CAN identifier of the acknowledgement."""
-        return self.frame.identifier.acknowledgement().encode()
-
-    @property
-    def error_id(self) -> int:
-        """CAN identifier of the error acknowledgement."""
-        return self.frame.identifier.acknowledgement(error=True).encode()
-
-    def is_answered_by(self, can_id: int, data: bytes | bytearray) -> bool:
-        """Whether a frame is the answer: by its identifier, and by what it repeats (errata C5)."""
-        if can_id == self.error_id:
-            return True
-        return can_id == self.acknowledgement_id and all(
-            (sent ^ received) & mask == 0
-            for sent, received, mask in zip(self.frame.data, data, self.mask, strict=False))
-
-    def result(self, can_id: int, data: bytes | bytearray) -> T:
-        """Return what the answer says.
-
-        Raises:
-            RefusedError: It is an error acknowledgement; the text says which error.
-            FrameError: Its length or content is wrong.
-        """
-        if can_id == self.error_id:
-            raise RefusedError(f"{node_name(self.frame.identifier.receiver)} cannot {self.name}: "
-                               f"{self._error(bytes(data))}")
-        try:
-            return self.decode(bytes(data))
-        except FrameError as error:
-            raise FrameError(f"{self.name}: {error}") from None
-
-    def _error(self, data: bytes) -> str:
-        """Return the error in words (errata C12)."""
-        if len(data) > 1 and data[1] in self.reasons:
-            return f"{self.reasons[data[1]]} (error {data.hex(' ').upper()})"
-        if not data:
-            return "error without a number"
-        return f"{ERRORS.get(data[0], f'unknown error {data[0]}')} (error {data.hex(' ').upper()})"
-
-
-@dataclass(frozen=True, eq=False)  # a row is itself only, so it can be hashed
-class Command(Generic[P, T]):
-    """A command: how it is asked, and how the answer is understood.
-
-    Attributes:
-        name: What it does, in words.
-        block: Command block.
-        block_command: Command within the block.
-        encode: Turns the arguments into the request's payload; raises SettingError.
-        decode: Turns the acknowledgement's payload into the result; raises FrameError.
-        mask: Which bits of the request's first bytes the acknowledgement repeats.
-        reasons: Numbers of specific errors in words.
-        section: Section of the manual.
-    """
-
-    name: str
-    block: int
-    block_command: int
-    encode: Callable[P, bytes]
-    decode: Callable[[bytes], T]
-    _: KW_ONLY
-    mask: bytes = b""
-    reasons: Mapping[int, str] = field(default_factory=dict)
-    section: str
-
-    def request(self, receiver: int, *args: P.args, **kwargs: P.kwargs) -> Request[T]:
-        """Return the request of this host to a node."""
-        return self.with_payload(receiver, self.encode(*args, **kwargs), self.decode)
-
-    def with_payload(self, receiver: int, payload: bytes,
-                     decode: Callable[[bytes], Result]) -> Request[Result]:
-        """Return a request with this payload, whose answer is understood by `decode`."""
-        identifier = Identifier(self.block, self.block_command, SPU_1, receiver)
-        return Request(self.name, Frame(identifier, payload), self.mask, decode, self.reasons)
 
 
 # --- system (section 10.2) ---
@@ -622,9 +312,10 @@ def _production_date(data: bytes) -> str:
 
 
 READ_POWER_CYCLES = _statistics("read the power cycles", 0x00,
-                                lambda data: PowerCycles(*_exactly(data, ">II")), "10.4.1")
-READ_OPERATING_TIME = _statistics("read the operating time", 0x01,
-                                  lambda data: OperatingTime(*_exactly(data, ">II")), "10.4.2")
+                                lambda data: PowerCycles(*unpack_exactly(data, ">II")), "10.4.1")
+READ_OPERATING_TIME = _statistics(
+    "read the operating time", 0x01, lambda data: OperatingTime(*unpack_exactly(data, ">II")),
+    "10.4.2")
 READ_UNDER_VOLTAGES = _statistics("read the under voltage counter", 0x02, _counter, "10.4.3")
 READ_WATCHDOG_RESETS = _statistics("read the watchdog reset counter", 0x03, _counter, "10.4.4")
 READ_PRODUCTION_DATE = _statistics("read the production date", 0x04, _production_date, "10.4.5")
@@ -672,7 +363,7 @@ def _measurement(element: CalibrationElement, dimension: int = 1,
                  method: CalibrationMethod = CalibrationMethod.MEASURE, *,
                  reset: bool = False) -> bytes:
     return bytes((0x80 | method << 5 | reset << 4, element, dimension,
-                  _reference_code(reference_voltage))) + bytes(4)
+                  reference_code(reference_voltage))) + bytes(4)
 
 
 def _celsius(data: bytes) -> float:

@@ -12,13 +12,8 @@ from dataclasses import KW_ONLY, dataclass
 from enum import Enum, IntEnum
 
 from driver_common.errors import FrameError, SettingError
-from icotronic_driver.commands import (
-    ADVERTISEMENT_STEP,
-    EEPROM_CHUNK,
-    NAME_LENGTH,
-    decode_text,
-    encode_text,
-)
+from icotronic_driver.commands import ADVERTISEMENT_STEP, EEPROM_CHUNK, NAME_LENGTH
+from icotronic_driver.values import decode_text, encode_text
 
 PAGE_SIZE = 256
 SYSTEM_CONFIGURATION, PRODUCT_DATA, STATISTICS, CALIBRATION = 0x0, 0x4, 0x5, 0x8  # page numbers

@@ -13,8 +13,9 @@ import can
 
 from driver_common.can_link import CanLink, parse_options
 from driver_common.errors import FrameError, LinkError, NoAnswerError
-from icotronic_driver.commands import ACCELERATION_DATA, Request
+from icotronic_driver.commands import ACCELERATION_DATA
 from icotronic_driver.identifier import SPU_1, Identifier, node_name, receiver_filter
+from icotronic_driver.request import Request
 
 T = TypeVar("T")
 

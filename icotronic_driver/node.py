@@ -14,17 +14,17 @@ from sensor_msgs.msg import BatteryState, Imu, Temperature
 
 from driver_common import diagnostics
 from driver_common.device_node import DeviceNode, run
-from driver_common.errors import DriverError
 from driver_common.settings import Option
-from icotronic_driver.commands import CLOCK, parse_request
+from icotronic_driver.commands import parse_request
 from icotronic_driver.eeprom import PAGE_NAMES, Field, FieldValue
 from icotronic_driver.identifier import STH_1, STU_1
 from icotronic_driver.line import Line
 from icotronic_driver.sensor import Options, Phase, Sensor, UnitIdentity
 from icotronic_driver.session import IcotronicBus, Listener
 from icotronic_driver.settings import SETTINGS
-from icotronic_driver.simulator import SimulatedIcotronic, simulated_network
+from icotronic_driver.simulator import simulated_network
 from icotronic_driver.streaming import AXES, LOAD_MAXIMUM
+from icotronic_driver.values import CLOCK
 from msg_conversions.battery import to_battery_state
 from msg_conversions.imu import UNKNOWN_VARIANCE, ImuTemplate
 from msg_conversions.temperature import to_temperature
@@ -99,7 +99,6 @@ class IcotronicNode(DeviceNode, Listener):
 
     def __init__(self) -> None:
         """Declare the parameters; raises SettingError."""
-        self._simulator: SimulatedIcotronic | None = None
         self._stream_options: list[Any] = []
         self._topics: dict[str, Any] = {}
         super().__init__("icotronic")
@@ -111,9 +110,9 @@ class IcotronicNode(DeviceNode, Listener):
         interface, channel = self.option("can_interface"), self.option("can_channel")
         options: list[str] = self.option("can_options")
         if interface == SIMULATED:
-            self._simulator = simulated_network().start()
+            self.simulator = simulator = simulated_network().start()
             interface = "socketcand"
-            options = [f"host={self._simulator.host}", f"port={self._simulator.port}"]
+            options = [f"host={simulator.host}", f"port={simulator.port}"]
         sensor = Options(
             sensor_name=self.option("sensor_name"), sensor_mac=self.option("sensor_mac"),
             sensor_number=self.option("sensor_number"),
@@ -122,12 +121,6 @@ class IcotronicNode(DeviceNode, Listener):
         self._stream_options = self._read_stream_options()
         return IcotronicBus(Line(interface, channel, self.option("can_bitrate"), options),
                             sensor, self)
-
-    def release(self) -> None:
-        """End the simulator."""
-        if self._simulator is not None:
-            self._simulator.close()
-            self._simulator = None
 
     def _set_live(self, options: Options) -> None:
         """Hand over the options that may change at run time."""
@@ -157,9 +150,8 @@ class IcotronicNode(DeviceNode, Listener):
             "imu": self.add_publisher(Imu, sensor, "imu/data_raw", depth=QUEUE_DEPTH),
             "battery_voltage": self.add_publisher(BatteryState, sensor, "battery"),
             "temperature": self.add_publisher(Temperature, sensor, "temperature")}
+        super().make_interfaces(sensor)
         for name, action in (
-                ("start_acquisition", lambda: self._enable(True)),
-                ("stop_acquisition", lambda: self._enable(False)),
                 ("scan", self._scan),
                 ("reconnect", self._reconnect),
                 ("reset_sth", lambda: self._reset(STH_1)),
@@ -174,33 +166,21 @@ class IcotronicNode(DeviceNode, Listener):
 
     # --- what the bus reports, in its thread ---
 
-    def on_found(self, sensor: Sensor) -> None:
-        """Show the sensor's settings as parameters."""
+    def describe(self, sensor: Sensor) -> str:
+        """Return identity, calibration and rate."""
         assert sensor.identity is not None
-        self.get_logger().info(
-            f'connected to "{sensor.identity.name}" ({sensor.identity.mac}), firmware '
+        return (
+            f'"{sensor.identity.name}" ({sensor.identity.mac}), firmware '
             f"{sensor.identity.firmware}; channel{'s' * (len(sensor.channels) > 1)} "
             f"{', '.join(f'{one.name} calibrated by {one.source}' for one in sensor.channels)}; "
             f"{sensor.sample_rate:.6g} samples per second")
+
+    def on_found(self, sensor: Sensor) -> None:
+        """Show the sensor's settings as parameters; say what its stream does to the bus."""
+        super().on_found(sensor)
         warning = sensor.load_warning(self.option("can_bitrate"))
         if warning:
-            self.get_logger().warning(warning)
-        self.show_settings("", sensor)
-
-    def on_values(self, sensor: Sensor) -> None:
-        """Show the values that were read again."""
-        self.show_settings("", sensor)
-
-    def on_lost(self, sensor: Sensor, error: DriverError) -> None:
-        """Log why there is no sensor."""
-        self.get_logger().error(f"{error} (waiting for it)")
-
-    def on_note(self, text: str, *, warning: bool = False) -> None:
-        """Log a line."""
-        if warning:  # rclpy takes one severity per line of code only
-            self.get_logger().warning(text)
-        else:
-            self.get_logger().info(text)
+            self.on_note(sensor, warning, warning=True)
 
     def on_stream(self, sensor: Sensor) -> Callable[[int, float, tuple[int, ...]], None]:
         """Return what publishes the samples of a stream that begins: the hot path."""
@@ -231,10 +211,6 @@ class IcotronicNode(DeviceNode, Listener):
                 convert(value, self.option("frame_id"), time.time_ns()))
 
     # --- services, in the executor ---
-
-    def _enable(self, enabled: bool) -> str:
-        self.call(lambda: self.bus.set_enabled(self.bus.sensor, enabled))
-        return f"acquisition {'started' if enabled else 'stopped'}"
 
     def _scan(self) -> str:
         seen = self.call(self.bus.scan)
@@ -303,10 +279,9 @@ class IcotronicNode(DeviceNode, Listener):
             "frames of another host": line.counts.other_host, "error frames": line.counts.errors,
             "connections": sensor.connections, "time-outs": sensor.time_outs,
             "unsaved settings": ", ".join(sorted(sensor.unsaved))}
-        values |= {f"{name} differs": f"wanted {wanted}, reported {reported}"
-                   for name, (wanted, reported) in dict(sensor.differing).items()}
+        values |= sensor.differences
         identity = sensor.identity
-        return diagnostics.to_status(f"{self.get_name()}: sensor",
+        return diagnostics.to_status(f"{self.get_name()}: {sensor.title}",
                                      f"{identity.name} {identity.mac}" if identity else "",
                                      *self._health(sensor), values)
 

@@ -8,14 +8,6 @@ from typing import NamedTuple
 
 from driver_common.device import Device, DeviceOptions
 from driver_common.sample_clock import SampleClock
-from icotronic_driver.commands import (
-    AdcConfiguration,
-    ErrorStatus,
-    NodeStatus,
-    OperatingTime,
-    PowerCycles,
-    Version,
-)
 from icotronic_driver.streaming import (
     AXES,
     LOAD_LIMIT,
@@ -26,6 +18,14 @@ from icotronic_driver.streaming import (
     StreamFormat,
     StreamStatistics,
     stream_format,
+)
+from icotronic_driver.values import (
+    AdcConfiguration,
+    ErrorStatus,
+    NodeStatus,
+    OperatingTime,
+    PowerCycles,
+    Version,
 )
 
 
@@ -130,14 +130,14 @@ class Sensor(Device):
         decoder: Decodes the stream; None while there is none.
         clock: Gives the samples of the stream their times.
         totals: Statistics of the streams before the present one.
-        enabled: Whether the stream is wanted, as far as the user of the services says.
-        connections: How often it was connected.
+        time_outs: How often it or the stationary unit did not answer.
     """
+
+    options: Options
 
     def __init__(self, options: Options) -> None:
         """Begin as an unknown sensor."""
         super().__init__(options)
-        self.options = options
         self.phase = Phase.SEARCHING
         self.target: SeenSensor | None = None
         self.seen: list[SeenSensor] = []
@@ -149,9 +149,25 @@ class Sensor(Device):
         self.decoder: StreamDecoder | None = None
         self.clock = SampleClock(1.0)
         self.totals = StreamStatistics()
-        self.enabled = True
-        self.connections = 0
         self.time_outs = 0
+
+    def __str__(self) -> str:
+        """Return what it is called in messages; there is only one."""
+        return "the sensor"
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether it was connected and configured."""
+        return self.phase is Phase.CONNECTED
+
+    def forget(self) -> None:
+        """Take note that the sensor is not connected any more."""
+        super().forget()
+        self.end_stream()
+        self.phase = Phase.SEARCHING
+        self.identity = None
+        self.target = None
+        self.seen = []
 
     @property
     def product(self) -> str:
@@ -210,7 +226,7 @@ class Sensor(Device):
             then.damaged + now.damaged, then.others + now.others, now.fault or then.fault)
 
     def end_stream(self) -> None:
-        """Keep the statistics of the stream that ended."""
+        """Keep the statistics of the stream that ended, if there was one."""
         self.totals = self.statistics
         self.decoder = None
 

@@ -14,10 +14,11 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, TypeVar
 
+from driver_common import device_bus
+from driver_common.device_bus import DeviceBus
 from driver_common.errors import (
     DriverError,
     FrameError,
-    LinkError,
     NoAnswerError,
     RefusedError,
     SettingError,
@@ -26,20 +27,15 @@ from driver_common.errors import (
 from driver_common.sample_clock import SampleClock
 from driver_common.settings import Raw, Record, Value
 from icotronic_driver import commands, eeprom
-from icotronic_driver.commands import (
-    SELF,
-    CalibrationElement,
-    Command,
-    IcotronicRecord,
-    Request,
-    decode_name,
-)
+from icotronic_driver.commands import SELF, IcotronicRecord, decode_name
 from icotronic_driver.eeprom import STH_EEPROM, STU_EEPROM, Field, FieldValue, Status
 from icotronic_driver.identifier import STH_1, STU_1
 from icotronic_driver.line import Line, StreamHandler
+from icotronic_driver.request import Command, Request
 from icotronic_driver.sensor import Options, Phase, Readings, SeenSensor, Sensor, UnitIdentity
 from icotronic_driver.settings import SETTINGS, nearest_adc_configuration
 from icotronic_driver.streaming import AXES, Calibration, StreamDecoder, supply_voltage
+from icotronic_driver.values import CalibrationElement, decode_text
 
 T = TypeVar("T")
 
@@ -55,20 +51,8 @@ DISCONNECT_TIMEOUT = 0.3  # s
 ON_THE_WAY = 0.05  # s without a frame after which none of a stopped stream will come
 
 
-class Listener:
+class Listener(device_bus.Listener[Sensor]):
     """What a user of the bus wants to hear; all called in the thread of the bus."""
-
-    def on_found(self, sensor: Sensor) -> None:
-        """Tell that the sensor was connected and configured."""
-
-    def on_values(self, sensor: Sensor) -> None:
-        """Tell that values of settings were read again."""
-
-    def on_lost(self, sensor: Sensor, error: DriverError) -> None:
-        """Tell that the sensor is not there (any more), once per change of the reason."""
-
-    def on_note(self, text: str, *, warning: bool = False) -> None:
-        """Tell something worth a line in the log."""
 
     def on_stream(self, sensor: Sensor) -> Callable[[int, float, tuple[int, ...]], None]:
         """Return what takes the samples of a stream that begins.
@@ -82,23 +66,21 @@ class Listener:
         """Tell that one of the sensor's readings is new."""
 
 
-class IcotronicBus:
+class IcotronicBus(DeviceBus[Sensor]):
     """A stationary unit on a CAN bus, and one sensor behind it.
 
     Attributes:
-        devices: The sensor.
         line: The CAN bus.
-        link_error: Why the bus is not open.
+        sensor: The sensor, the only one of `devices`.
     """
+
+    _listener: Listener
 
     def __init__(self, line: Line, options: Options, listener: Listener) -> None:
         """Prepare the bus; nothing is opened."""
         self.line = line
         self.sensor = Sensor(options)
-        self.devices = [self.sensor]
-        self.link_error: LinkError | None = None
-        self._listener = listener
-        self._active = False
+        super().__init__([self.sensor], listener)
         self._connect_until = self._connect_again = 0.0
         self._settled_since = 0.0
         self._searching_since = 0.0
@@ -109,59 +91,20 @@ class IcotronicBus:
 
     # --- what the thread of the bus calls ---
 
-    def open(self) -> None:
-        """Open the CAN bus; raises LinkError."""
-        try:
-            self.line.open()
-        except LinkError as error:
-            self.link_error = error
-            raise
-        self.link_error = None
-        self.sensor.due = 0.0
-        self.sensor.backoff.reset()
-        self._searching_since = time.monotonic()
-
-    def poll(self) -> float:
-        """Do the next step; return the time in s until the one after."""
-        step = {Phase.SEARCHING: self._search, Phase.CONNECTING: self._await_connection,
-                Phase.CONNECTED: self._serve}[self.sensor.phase]
-        try:
-            if self.sensor.due <= time.monotonic():
-                step()
-        except LinkError as error:
-            self.link_error = error
-            raise
-        except DriverError as error:
-            self._lose(error)
-        return max(0.0, self.sensor.due - time.monotonic())
-
     def close(self) -> None:
         """Leave the sensor stopped and disconnected, and close the bus."""
         if self.line.is_open:
             with contextlib.suppress(DriverError):
                 self._disconnect()
-        self._forget()
+        self.line.on_stream = None
+        self.sensor.forget()
         self.line.close()
 
     # --- what a user calls, through the thread ---
 
-    def set_active(self, active: bool) -> None:
-        """Start or stop the stream, now and after every reconnection."""
-        self._active = active
-        self._start_or_stop()
-
-    def set_enabled(self, sensor: Sensor, enabled: bool) -> None:
-        """Start or stop the stream; raises DriverError."""
-        self._require()
-        if enabled and not self._active:
-            raise SettingError("the node is not active, so nothing would be published; "
-                               "activate it first")
-        sensor.enabled = enabled
-        self._start_or_stop()
-
     def write(self, sensor: Sensor, changes: Mapping[str, Value]) -> dict[str, Value]:
         """Write settings, all or none, and return what the sensor reports; raises DriverError."""
-        self._require()
+        self._require(self.sensor)
         with self._stopped_for(changes):
             reported = sensor.write(_Access(self.line), changes)
             if any(name.startswith("calibration.") for name in changes):
@@ -175,9 +118,9 @@ class IcotronicBus:
         if self.sensor.phase is Phase.CONNECTED:
             self._stop()
             self._apply_sample_rate()
-            self.sensor.make_as_wanted(self._write_wanted, self._listener.on_note)
+            self.sensor.make_as_wanted(self._write_wanted, self._note)
             self._choose_calibrations()
-            self._start_or_stop()
+            self._start_or_stop(self.sensor)
             self._listener.on_values(self.sensor)
 
     def scan(self) -> list[SeenSensor]:
@@ -191,25 +134,25 @@ class IcotronicBus:
     def reconnect(self) -> None:
         """Disconnect, and search again."""
         self._disconnect()
-        self._lose(DriverError("reconnecting, as asked for"))
+        self._lose(self.sensor, DriverError("reconnecting, as asked for"))
         self.sensor.due = 0.0
 
     def reset(self, node: int) -> None:
         """Reset the sensor or the stationary unit; the connection comes back by itself."""
         if node == STH_1:
-            self._require()
+            self._require(self.sensor)
         self.line.request(commands.RESET.request(node))
-        self._lose(DriverError("reset, as asked for"))
+        self._lose(self.sensor, DriverError("reset, as asked for"))
 
     def execute(self, request: Request[T]) -> T:
         """Carry out any request; raises DriverError."""
         if request.frame.identifier.receiver == STH_1:
-            self._require()
+            self._require(self.sensor)
         return self.line.request(request)
 
     def measure(self) -> dict[str, float]:
         """Make a calibration measurement of everything; return the results by name."""
-        self._require()
+        self._require(self.sensor)
         results: dict[str, float] = {}
         for element, dimension in _MEASUREMENTS:
             name = f"{element.name.lower()} {dimension}"
@@ -224,13 +167,13 @@ class IcotronicBus:
     def read_eeprom(self, node: int) -> dict[Field, FieldValue]:
         """Return all fields of the EEPROM of the sensor or the stationary unit."""
         if node == STH_1:
-            self._require()
+            self._require(self.sensor)
         fields = STH_EEPROM if node == STH_1 else STU_EEPROM
         return {field: self._read_field(node, field) for field in fields.values()}
 
     def unsaved(self) -> dict[Field, tuple[FieldValue, FieldValue]]:
         """Return the EEPROM fields that a save would change: (stored, new)."""
-        self._require()
+        self._require(self.sensor)
         changes: dict[Field, tuple[FieldValue, FieldValue]] = {}
         for name, field in _STORED.items():
             if name in self.sensor.values:
@@ -267,6 +210,16 @@ class IcotronicBus:
                                f"{field.text(stored)}; it may be locked")
 
     # --- searching and connecting (errata C4) ---
+
+    def _open_link(self) -> None:
+        self.line.open()
+        self._searching_since = time.monotonic()
+
+    def _find(self, sensor: Sensor) -> None:
+        if sensor.phase is Phase.SEARCHING:
+            self._search()
+        else:
+            self._await_connection()
 
     def _search(self) -> None:
         """Look for the wanted sensor, and ask the stationary unit to connect it."""
@@ -357,17 +310,14 @@ class IcotronicBus:
         sensor.identity = self._identify(STH_1)
         sensor.readings = Readings()
         self._check_eeprom()
-        sensor.read_all(_Access(self.line), SETTINGS, self._listener.on_note)
+        sensor.read_all(_Access(self.line), SETTINGS, self._note)
         sensor.eeprom_calibrations = self._eeprom_calibrations()
         sensor.phase = Phase.CONNECTED
         self._apply_sample_rate()
-        sensor.make_as_wanted(self._write_wanted, self._listener.on_note)
+        sensor.make_as_wanted(self._write_wanted, self._note)
         self._choose_calibrations()
-        sensor.error = None
-        sensor.backoff.reset()
-        sensor.connections += 1
-        self._listener.on_found(sensor)
-        self._start_or_stop()
+        self._note_found(sensor)
+        self._start_or_stop(sensor)
 
     def _identify(self, node: int) -> UnitIdentity:
         def ask(command: Command[[], T]) -> T | None:
@@ -382,7 +332,7 @@ class IcotronicBus:
             name, self.line.request(commands.READ_MAC.request(node, SELF)),
             ask(commands.READ_GTIN), ask(commands.READ_HARDWARE_VERSION),
             ask(commands.READ_FIRMWARE_VERSION), ask(commands.READ_RELEASE_NAME),
-            commands.decode_text(b"".join(part or b"" for part in serial)),
+            decode_text(b"".join(part or b"" for part in serial)),
             ask(commands.READ_PRODUCTION_DATE))
 
     def _check_eeprom(self) -> None:
@@ -390,7 +340,7 @@ class IcotronicBus:
         byte = self._read_field(STH_1, STH_EEPROM["EEPROM Status"])
         assert isinstance(byte, int)
         if Status.of(byte) is Status.UNINITIALIZED:
-            self._listener.on_note(f"the sensor's EEPROM is not initialised (0x{byte:02X}): at its "
+            self._note(f"the sensor's EEPROM is not initialised (0x{byte:02X}): at its "
                                    "next reset it takes default values", warning=True)
 
     def _eeprom_calibrations(self) -> dict[str, Calibration]:
@@ -415,7 +365,7 @@ class IcotronicBus:
                     f"{adc.prescaler}, acquisition time {adc.acquisition_time} and oversampling "
                     f"rate {adc.oversampling_rate}")
             if text != self._told_rate:
-                self._listener.on_note(text)
+                self._note(text)
             self._told_rate = text
 
     def _write_wanted(self, changes: Mapping[str, Value]) -> object:
@@ -423,41 +373,34 @@ class IcotronicBus:
 
     def _choose_calibrations(self) -> None:
         for complaint in self.sensor.choose_calibrations():
-            self._listener.on_note(complaint, warning=True)
+            self._note(complaint, warning=True)
 
     # --- streaming ---
 
-    def _serve(self) -> None:
+    def _attend(self, sensor: Sensor) -> None:
         """Receive the stream, or check the connection; read something now and then."""
-        if self._wants_stream != (self.sensor.decoder is not None):
-            self._start_or_stop()  # it did not work when it was asked for
-        if self.sensor.decoder is not None:
-            frames = self.sensor.decoder.statistics.frames
+        if self.wants(sensor) != (sensor.decoder is not None):
+            self._start_or_stop(sensor)  # it did not work when it was asked for
+        if sensor.decoder is not None:
+            frames = sensor.decoder.statistics.frames
             self.line.listen(LISTEN_TIME)
-            if self.sensor.decoder.statistics.frames != frames:
+            if sensor.decoder.statistics.frames != frames:
                 self._last_frame = time.monotonic()
             elif time.monotonic() - self._last_frame > SILENCE:
                 self._look_after_stream()
         else:
             if not self.line.request(commands.CHECK_CONNECTED.request(STU_1)):
                 raise NoAnswerError("the sensor disconnected")
-            self.sensor.due = time.monotonic() + KEEP_ALIVE
+            sensor.due = time.monotonic() + KEEP_ALIVE
         if time.monotonic() >= self._next_reading:
             self._read_next()
 
-    @property
-    def _wants_stream(self) -> bool:
-        return self._active and self.sensor.enabled
-
-    def _start_or_stop(self) -> None:
-        if self.sensor.phase is not Phase.CONNECTED:
-            return
-        if self._wants_stream:
-            if self.sensor.decoder is None:
-                self._start()
-        else:
+    def _start_or_stop(self, sensor: Sensor) -> None:
+        if not self.wants(sensor):
             self._stop()
-        self.sensor.due = 0.0
+        elif sensor.decoder is None:
+            self._start()
+        sensor.due = 0.0
 
     def _start(self) -> None:
         sensor = self.sensor
@@ -466,7 +409,11 @@ class IcotronicBus:
         sensor.clock = SampleClock(sensor.sample_rate)
         self.line.on_stream = self._stream_handler(sensor)
         self._last_frame = time.monotonic()
-        self.line.request(commands.START_ACCELERATION.request(STH_1, form))
+        try:
+            self.line.request(commands.START_ACCELERATION.request(STH_1, form))
+        except DriverError:
+            self._end_stream()
+            raise
 
     def _stream_handler(self, sensor: Sensor) -> StreamHandler:
         """Return what is done with each frame of the stream: the hot path."""
@@ -486,7 +433,7 @@ class IcotronicBus:
             publish(clock.time_of(number), clock.period, values)
             if decoder.statistics.lost != lost:
                 if not lost:
-                    self._listener.on_note(f"{decoder.statistics.lost} frames were lost on the "
+                    self._note(f"{decoder.statistics.lost} frames were lost on the "
                                            "radio; more are counted in the diagnostics only",
                                            warning=True)
                 lost = decoder.statistics.lost
@@ -497,8 +444,11 @@ class IcotronicBus:
         if self.sensor.decoder is not None:
             self.line.request(commands.STOP_ACCELERATION.request(STH_1))
             self._take_what_is_on_the_way()
-            self.line.on_stream = None
-            self.sensor.end_stream()
+            self._end_stream()
+
+    def _end_stream(self) -> None:
+        self.line.on_stream = None
+        self.sensor.end_stream()
 
     def _take_what_is_on_the_way(self) -> None:
         """Receive the last frames of a stopped stream, before the next one could get them."""
@@ -519,42 +469,29 @@ class IcotronicBus:
             yield
         finally:
             if streaming:
-                self._start_or_stop()
+                self._start_or_stop(self.sensor)
 
     def _look_after_stream(self) -> None:
         """React to a stream that fell silent: start it again where the sensor is still there."""
         if not self.line.request(commands.CHECK_CONNECTED.request(STU_1)):
             raise NoAnswerError("the sensor was lost while it streamed")
-        self.line.on_stream = None
-        self.sensor.end_stream()
-        self._listener.on_note("the stream fell silent; starting it again", warning=True)
-        self._start_or_stop()
+        self._end_stream()
+        self._note("the stream fell silent; starting it again", warning=True)
+        self._start_or_stop(self.sensor)
 
     # --- losing ---
 
-    def _lose(self, error: DriverError) -> None:
+    def _lose(self, sensor: Sensor, error: DriverError) -> None:
         """Note that the sensor is not there; look for it more and more rarely."""
-        sensor = self.sensor
-        was_there = sensor.phase is not Phase.SEARCHING
-        news = was_there or _without_rssi(sensor.error) != _without_rssi(error)
-        if isinstance(error, NoAnswerError):
-            sensor.time_outs += 1
-        self._forget()
-        sensor.error = error
-        sensor.due = time.monotonic() + sensor.backoff.pause()
-        if was_there:
+        if sensor.phase is not Phase.SEARCHING:
             self._searching_since = time.monotonic()
-        if news:
-            self._listener.on_lost(sensor, error)
-
-    def _forget(self) -> None:
+        sensor.time_outs += isinstance(error, NoAnswerError)
         self.line.on_stream = None
-        if self.sensor.decoder is not None:
-            self.sensor.end_stream()
-        self.sensor.phase = Phase.SEARCHING
-        self.sensor.identity = None
-        self.sensor.target = None
-        self.sensor.seen = []
+        super()._lose(sensor, error)
+
+    def _gist(self, error: DriverError | None) -> str:
+        """Return an error without what changes at every look."""
+        return re.sub(r"-?\d+ dBm", "", str(error))
 
     def _disconnect(self) -> None:
         """Stop the stream and release the sensor, so that it can sleep."""
@@ -566,10 +503,8 @@ class IcotronicBus:
 
     # --- requests ---
 
-    def _require(self) -> None:
-        if self.sensor.phase is not Phase.CONNECTED:
-            reason = self.link_error or self.sensor.error or self.sensor.phase.value
-            raise NoAnswerError(f"the sensor is not connected: {reason}")
+    def _note(self, text: str, *, warning: bool = False) -> None:
+        self._listener.on_note(self.sensor, text, warning=warning)
 
     def _read_next(self) -> None:
         """Read one of the things that are read now and then; what is refused is left out."""
@@ -603,11 +538,6 @@ def _raw(field: Field, value: FieldValue) -> bytes:
         return field.encode(value)
     except SettingError:
         return b""
-
-
-def _without_rssi(error: DriverError | None) -> str:
-    """Return an error without what changes at every look."""
-    return re.sub(r"-?\d+ dBm", "", str(error))
 
 
 def _described(options: Options) -> str:

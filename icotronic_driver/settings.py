@@ -13,19 +13,21 @@ from driver_common.errors import SettingError
 from driver_common.settings import Raw, Setting, Value
 from icotronic_driver import commands
 from icotronic_driver.commands import (
-    ACQUISITION_TIMES,
     ADVERTISEMENT_STEP,
     FIRST_PART,
     NAME_LENGTH,
+    SELF,
+    IcotronicRecord,
+    Part,
+)
+from icotronic_driver.values import (
+    ACQUISITION_TIMES,
     OVERSAMPLING_RATES,
     PRESCALERS,
     REFERENCE_STEP,
     REFERENCE_VOLTAGES,
-    SELF,
     AdcConfiguration,
     CalibrationElement,
-    IcotronicRecord,
-    Part,
     decode_text,
     encode_text,
 )

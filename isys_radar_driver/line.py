@@ -162,16 +162,15 @@ class Line:
         link = self.link
         deadline = time.monotonic() + timeout
         stamp = 0
-        while (remaining := deadline - time.monotonic()) > 0:
-            data = link.read(remaining)
-            if not data:
-                break
+        while data := link.read(deadline - time.monotonic()):
             if not self.parser.pending:
                 stamp = time.time_ns() - round(link.seconds(len(data)) * 1e9)
             for frame in self.parser.feed(data):
                 yield frame, stamp
             if self.parser.pending:
                 deadline = max(deadline, time.monotonic() + BYTE_GAP)
+            elif time.monotonic() >= deadline:
+                break
         for frame in self.parser.flush():
             yield frame, stamp
 

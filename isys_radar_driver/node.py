@@ -13,9 +13,7 @@ from std_msgs.msg import Float32MultiArray
 
 from driver_common import diagnostics
 from driver_common.device_node import DeviceNode, run
-from driver_common.errors import DriverError, SettingError
 from driver_common.settings import Option, Value
-from driver_common.simulated_line import SimulatedLine
 from isys_radar_driver import commands
 from isys_radar_driver.commands import Command, RangeList
 from isys_radar_driver.models import find_model
@@ -84,7 +82,6 @@ class IsysRadarNode(DeviceNode, Listener):
 
     def __init__(self) -> None:
         """Declare the parameters; raises SettingError."""
-        self._simulator: SimulatedLine | None = None
         self._publishers_of: dict[str, dict[str, Any]] = {}
         super().__init__("isys_radar")
 
@@ -95,18 +92,13 @@ class IsysRadarNode(DeviceNode, Listener):
         options = [self._sensor_options(sensor) for sensor in self.sensors]
         port: str = self.option("serial_port")
         if port.startswith(SIMULATED):
-            self._simulator, _ = simulated_line(
+            simulator, _ = simulated_line(
                 [port.removeprefix(SIMULATED)],
                 [option.address for option in options if option.address],
                 baud_rate=self.option("serial_baud"))
-            port = self._simulator.start().port
+            self.simulator = simulator
+            port = simulator.start().port
         return RadarBus(port, self.option("serial_baud"), options, self)
-
-    def release(self) -> None:
-        """End the simulator."""
-        if self._simulator is not None:
-            self._simulator.close()
-            self._simulator = None
 
     def _sensor_options(self, sensor: str) -> Options:
         model = self.option("model", sensor)
@@ -141,9 +133,8 @@ class IsysRadarNode(DeviceNode, Listener):
     def make_interfaces(self, sensor: str) -> None:
         """Create topics and services of a sensor."""
         self._publishers_of[sensor] = {"points": self.add_publisher(PointCloud2, sensor, "points")}
+        super().make_interfaces(sensor)
         for name, action in (
-                ("start_acquisition", lambda radar: self._enable(radar, True)),
-                ("stop_acquisition", lambda radar: self._enable(radar, False)),
                 ("preview_save", self._preview_save),
                 ("save_sensor_settings",
                  lambda radar: self._save(radar, commands.SAVE_SENSOR_SETTINGS)),
@@ -158,7 +149,7 @@ class IsysRadarNode(DeviceNode, Listener):
             self._add_service(sensor, name, action)
 
     def _add_service(self, sensor: str, name: str, action: Callable[[Radar], str]) -> None:
-        self.add_trigger(sensor, name, lambda: action(self._radar(sensor)))
+        self.add_trigger(sensor, name, lambda: action(self.device(sensor)))
 
     def add_device_interfaces(self, radar: Radar) -> None:
         """Create the topics that the radar's model can serve."""
@@ -169,38 +160,20 @@ class IsysRadarNode(DeviceNode, Listener):
                     if name not in publishers:
                         publishers[name] = self.add_publisher(kind, radar.options.name, name)
 
-    def _radar(self, sensor: str) -> Radar:
-        radar: Radar = next(radar for radar in self.bus.devices if radar.options.name == sensor)
-        return radar
-
     # --- what the bus reports, in its thread ---
 
+    def describe(self, radar: Radar) -> str:
+        """Return identity and link."""
+        return f"{radar.identity}, address {radar.address}, {self.bus.line.baud_rate} Bd"
+
     def on_found(self, radar: Radar) -> None:
-        """Show the radar's settings as parameters."""
-        self.get_logger().info(f"{self._title(radar)}: connected to {radar.identity}, address "
-                               f"{radar.address}, {self.bus.line.baud_rate} Bd")
+        """Show the radar's settings as parameters; say once why there will be no points."""
+        super().on_found(radar)
         assert radar.model is not None
-        if not radar.model.has_target_lists:
-            self.get_logger().warning(
-                f"{self._title(radar)}: the {radar.model.name} does not hand out target lists "
-                "over its serial port, so there are no points; it can be configured here, and its "
-                "targets come from its other interfaces")
-        self.show_settings(radar.options.name, radar)
-
-    def on_values(self, radar: Radar) -> None:
-        """Show the values that were read again."""
-        self.show_settings(radar.options.name, radar)
-
-    def on_lost(self, radar: Radar, error: DriverError) -> None:
-        """Log why there is no radar."""
-        self.get_logger().error(f"{self._title(radar)}: {error} (waiting for it)")
-
-    def on_note(self, radar: Radar, text: str, *, warning: bool = False) -> None:
-        """Log a line."""
-        if warning:  # rclpy takes one severity per line of code only
-            self.get_logger().warning(f"{self._title(radar)}: {text}")
-        else:
-            self.get_logger().info(f"{self._title(radar)}: {text}")
+        if not radar.model.has_target_lists and radar.connections == 1:
+            self.on_note(radar, f"the {radar.model.name} does not hand out target lists over its "
+                         "serial port, so there are no points; it can be configured here, and its "
+                         "targets come from its other interfaces", warning=True)
 
     def on_target_list(self, radar: Radar, targets: TargetList, stamp: int) -> None:
         """Publish the targets as points."""
@@ -244,15 +217,7 @@ class IsysRadarNode(DeviceNode, Listener):
         offset: float = self.option("time_offset", sensor)
         return self.option("frame_id", sensor), stamp + round(offset * 1e9)
 
-    @staticmethod
-    def _title(radar: Radar) -> str:
-        return radar.options.name or "radar"
-
     # --- services, in the executor ---
-
-    def _enable(self, radar: Radar, enabled: bool) -> str:
-        self.call(lambda: self.bus.set_enabled(radar, enabled))
-        return f"acquisition {'started' if enabled else 'stopped'}"
 
     def _save(self, radar: Radar, command: Command[None]) -> str:
         saved = self.call(lambda: self.bus.save(radar, command))
@@ -277,16 +242,8 @@ class IsysRadarNode(DeviceNode, Listener):
         return "temperature thresholds are " + ", ".join(f"{value:g} °C" for value in thresholds)
 
     def _change_address(self, radar: Radar) -> str:
-        sensor = radar.options.name
-        address = self.option("new_address", sensor)
-        if not address:
-            raise SettingError(f"set the parameter {self.prefix(sensor)}new_address first")
-        old = radar.address
-        self.call(lambda: self.bus.change_address(radar, address))
-        prefix = self.prefix(sensor)
-        self.store.store({prefix + "address": address, prefix + "new_address": 0})
-        return (f"the sensor moved from address {old} to {address} and keeps it; put "
-                f"'{prefix}address: {address}' into your parameter file")
+        return self.give_address(radar.options.name,
+                                 lambda address: self.bus.change_address(radar, address))
 
     def _read_raw_signals(self, radar: Radar) -> str:
         raw = self.call(lambda: self.bus.read_raw_signals(radar))
@@ -314,16 +271,15 @@ class IsysRadarNode(DeviceNode, Listener):
         values |= {
             "target lists": counts.target_lists, "lost cycles": counts.lost_cycles,
             "clippings": counts.clippings, "time-outs": counts.timeouts,
-            "refusals": counts.refusals, "connections": counts.connections,
+            "refusals": counts.refusals, "connections": radar.connections,
             "damaged frames": line.parser.damaged_frames,
             "dropped bytes": line.parser.dropped_bytes,
             "stale frames": line.stale_frames,
             "unsaved settings": ", ".join(sorted(radar.unsaved))}
         values |= {f"{name} temperature [°C]": celsius
                    for name, celsius in radar.temperatures.items()}
-        values |= {f"{name} differs": f"wanted {wanted}, reported {reported}"
-                   for name, (wanted, reported) in radar.differing.items()}
-        name = f"{self.get_name()}: {self._title(radar)}"
+        values |= radar.differences
+        name = f"{self.get_name()}: {radar.title}"
         hardware_id = f"{identity.model.name} {identity.serial_number}" if identity else ""
         return diagnostics.to_status(name, hardware_id, *self._health(radar), values)
 

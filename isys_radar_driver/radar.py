@@ -48,7 +48,6 @@ class Statistics:
     clippings: int = 0
     timeouts: int = 0
     refusals: int = 0
-    connections: int = 0
 
 
 @dataclass
@@ -80,30 +79,42 @@ class Radar(Device):
         address: Its address, 0 while unknown.
         identity: Who it is; None while it is not connected.
         temperatures: Board temperatures in °C, by name.
-        enabled: Whether acquisition is wanted, as far as the user of the services says.
         measuring: Whether acquisition was started.
     """
+
+    KIND = "radar"
+
+    options: Options
 
     def __init__(self, options: Options) -> None:
         """Begin as an unknown radar."""
         super().__init__(options)
-        self.options = options
         self.address = options.address
         self.identity: Identity | None = None
         self.temperatures: dict[str, float] = {}
-        self.enabled = True
         self.measuring = False
         self.statistics = Statistics()
         self.arrivals: deque[float] = deque()
         self._cycle_end = 0.0  # when the cycle of the last arrival ended, as far as known
-        self.misses = 0
         self.fixed_targets = 0  # learned length of fixed-length lists
         self.checks = 0  # how often it was checked for a reset
 
+    def __str__(self) -> str:
+        """Return name or address for messages."""
+        return self.options.name or (f"address {self.address}" if self.address else self.KIND)
+
     @property
-    def name(self) -> str:
-        """Name of the radar in messages."""
-        return self.options.name or (f"address {self.address}" if self.address else "radar")
+    def is_connected(self) -> bool:
+        """Whether it was found, identified and configured."""
+        return self.identity is not None
+
+    def forget(self) -> None:
+        """Take note that the radar is not connected any more."""
+        super().forget()
+        self.identity = None
+        self.measuring = False
+        self.arrivals.clear()
+        self.address = self.options.address
 
     @property
     def model(self) -> Model | None:

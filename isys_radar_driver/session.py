@@ -9,14 +9,13 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from functools import partial
 from typing import TypeVar
 
-from driver_common.device import Note
+from driver_common import device_bus
+from driver_common.device_bus import DeviceBus
 from driver_common.errors import (
     DriverError,
     FrameError,
-    LinkError,
     NoAnswerError,
     RefusedError,
     SettingError,
@@ -25,12 +24,7 @@ from driver_common.errors import (
 from driver_common.settings import Raw, Record, Setting, Value, read_settings
 from isys_radar_driver import commands
 from isys_radar_driver.commands import Command, IsysRecord, Location, RangeList, RawSignals
-from isys_radar_driver.frames import (
-    BROADCAST,
-    FIRST_ADDRESS,
-    LAST_ADDRESS,
-    Frame,
-)
+from isys_radar_driver.frames import BROADCAST, FIRST_ADDRESS, LAST_ADDRESS, Frame
 from isys_radar_driver.line import LATENCY, OVERHEAD, REPLY_TIMEOUT, Line
 from isys_radar_driver.models import BAUD_RATES, Model, model_of_product
 from isys_radar_driver.radar import Identity, Options, Radar
@@ -42,24 +36,11 @@ T = TypeVar("T")
 EEPROM_TIMEOUT = 1.0  # s, writing the EEPROM takes its time
 RAW_TIMEOUT = 3.0  # s until the first byte of raw signals
 ATTEMPTS = 2
-MISSES_UNTIL_LOST = 3
 KEEP_ALIVE = 1.0  # s between requests to a radar that is not measuring
 
 
-class Listener:
+class Listener(device_bus.Listener[Radar]):
     """What a user of the bus wants to hear; all called in the thread of the bus."""
-
-    def on_found(self, radar: Radar) -> None:
-        """Tell that the radar was identified and configured."""
-
-    def on_values(self, radar: Radar) -> None:
-        """Tell that values of settings were read again."""
-
-    def on_lost(self, radar: Radar, error: DriverError) -> None:
-        """Tell that the radar is not there (any more), once per change of the reason."""
-
-    def on_note(self, radar: Radar, text: str, *, warning: bool = False) -> None:
-        """Tell something worth a line in the log."""
 
     def on_target_list(self, radar: Radar, targets: TargetList, stamp: int) -> None:
         """Take a target list; `stamp` is the host's time in ns when the reply began."""
@@ -74,14 +55,14 @@ class Listener:
         """Tell that the board temperatures of a radar were read."""
 
 
-class RadarBus:
+class RadarBus(DeviceBus[Radar]):
     """Several radars on one serial line, or one.
 
     Attributes:
-        devices: The radars, in the order of their turns.
         line: The serial line.
-        link_error: Why the port is not open.
     """
+
+    _listener: Listener
 
     def __init__(self, port: str, baud_rate: int, radars: Iterable[Options],
                  listener: Listener) -> None:
@@ -96,14 +77,10 @@ class RadarBus:
         Raises:
             SettingError: Of several radars, one has no address of its own.
         """
+        super().__init__(map(Radar, radars), listener)
         self.line = Line(port)
-        self.devices = [Radar(options) for options in radars]
         self._check_addresses()
         self._baud_rate = baud_rate
-        self._listener = listener
-        self.link_error: LinkError | None = None
-        self._active = False
-        self._turn = 0
 
     def _check_addresses(self) -> None:
         owners: dict[int, str] = {}
@@ -118,59 +95,18 @@ class RadarBus:
 
     # --- what the thread of the bus calls ---
 
-    def open(self) -> None:
-        """Open the port; raises LinkError."""
-        with self._link_errors_noted():
-            self.line.open(self._baud_candidates(self.devices[0])[0])
-        self.link_error = None
-        for radar in self.devices:
-            radar.due = 0.0
-            radar.backoff.reset()
-
-    def poll(self) -> float:
-        """Serve the next radar whose turn it is; return the time in s until the next turn."""
-        now = time.monotonic()
-        for offset in range(len(self.devices)):
-            index = (self._turn + offset) % len(self.devices)
-            radar = self.devices[index]
-            if radar.due <= now:
-                self._turn = index + 1
-                with self._link_errors_noted():
-                    self._serve(radar)
-                break
-        return max(0.0, min(radar.due for radar in self.devices) - time.monotonic())
-
     def close(self) -> None:
         """Leave the radars stopped and close the port."""
         if not self.line.is_open:
             return
         for radar in self.devices:
-            if radar.identity is not None:
+            if radar.is_connected:
                 with contextlib.suppress(DriverError):
                     self._stop(radar)
-                self._forget(radar)
+                radar.forget()
         self.line.close()
 
     # --- what a user calls, through the thread ---
-
-    def set_active(self, active: bool) -> None:
-        """Start or stop the acquisition of all radars, now and after every reconnection."""
-        self._active = active
-        for radar in self.devices:
-            if radar.identity is not None:
-                try:
-                    self._start_or_stop(radar)
-                except (NoAnswerError, RefusedError) as error:
-                    self._lose(radar, error)
-
-    def set_enabled(self, radar: Radar, enabled: bool) -> None:
-        """Start or stop the acquisition of one radar; raises DriverError."""
-        self._require(radar)
-        if enabled and not self._active:
-            raise SettingError("the node is not active, so nothing would be published; "
-                               "activate it first")
-        radar.enabled = enabled
-        self._start_or_stop(radar)
 
     def write(self, radar: Radar, changes: Mapping[str, Value]) -> dict[str, Value]:
         """Write settings, all or none, and return what the radar reports.
@@ -267,54 +203,24 @@ class RadarBus:
 
     # --- life of a radar ---
 
-    def _serve(self, radar: Radar) -> None:
-        """Do the radar's next step; only a LinkError gets out."""
-        if radar.identity is None:
-            self._find_or_wait(radar)
-            return
+    def _open_link(self) -> None:
+        self.line.open(self._baud_candidates(self.devices[0])[0])
+
+    def _attend(self, radar: Radar) -> None:
+        """Measure, or look whether the radar is there."""
         try:
-            if radar.measuring and radar.identity.model.has_target_lists:
+            if radar.measuring != self.wants(radar):
+                self._start_or_stop(radar)  # it did not work when it was asked for
+            if radar.measuring and self._model(radar).has_target_lists:
                 self._measure(radar)
             else:
                 self._keep_alive(radar)
-            radar.misses = 0
+            self._note_well(radar)
         except RefusedError as error:
             self._configure_again(radar, str(error))
         except (NoAnswerError, FrameError) as error:
             radar.statistics.timeouts += 1
-            radar.misses += 1
-            radar.due = 0.0
-            if radar.misses >= MISSES_UNTIL_LOST:
-                self._lose(radar, error)
-        except SettingError as error:
-            self._lose(radar, error)
-
-    def _find_or_wait(self, radar: Radar) -> None:
-        try:
-            self._find(radar)
-        except LinkError:
-            raise
-        except DriverError as error:
-            self._lose(radar, self._explained(radar, error))
-
-    def _lose(self, radar: Radar, error: DriverError) -> None:
-        """Note that the radar is not there; ask for it more and more rarely."""
-        news = radar.identity is not None or str(radar.error) != str(error)
-        self._forget(radar)
-        radar.error = error
-        others_work = any(other.identity for other in self.devices)
-        radar.backoff.last = 10.0 if others_work else 2.0
-        radar.due = time.monotonic() + radar.backoff.pause()
-        if news:
-            self._listener.on_lost(radar, error)
-
-    @staticmethod
-    def _forget(radar: Radar) -> None:
-        radar.identity = None
-        radar.measuring = False
-        radar.arrivals.clear()
-        radar.misses = 0
-        radar.address = radar.options.address
+            self._note_miss(radar, error)
 
     def _find(self, radar: Radar) -> None:
         """Find the radar at one of the possible baud rates, identify and configure it."""
@@ -343,23 +249,15 @@ class RadarBus:
         except DriverError:
             radar.identity = None
             raise
-        radar.error = None
-        radar.backoff.reset()
-        radar.statistics.connections += 1
-        self._listener.on_found(radar)
+        self._note_found(radar)
 
     def _configure_again(self, radar: Radar, reason: str) -> None:
         """React to a radar that seems to have been reset without notice."""
         self._listener.on_note(radar, f"{reason}; configuring it again", warning=True)
-        try:
-            self._configure(radar)
-            self._listener.on_values(radar)
-            if radar.measuring and self._require(radar).has_target_lists:
-                self._measure(radar)
-        except LinkError:
-            raise
-        except DriverError as error:
-            self._lose(radar, error)
+        self._configure(radar)
+        self._listener.on_values(radar)
+        if radar.measuring and self._model(radar).has_target_lists:
+            self._measure(radar)
 
     def _configure(self, radar: Radar) -> None:
         """Read all settings, make them as wanted, and start if that is wanted."""
@@ -374,12 +272,11 @@ class RadarBus:
             return radar.write(_Access(self, radar), changes)
 
     def _start_or_stop(self, radar: Radar) -> None:
-        wanted = self._active and radar.enabled
-        if not wanted:
-            self._stop(radar)
-        else:
+        if self.wants(radar):
             self._execute(radar, commands.START)
             radar.measuring = True
+        else:
+            self._stop(radar)
         radar.arrivals.clear()
         radar.due = 0.0
 
@@ -457,23 +354,14 @@ class RadarBus:
 
     # --- requests ---
 
-    @contextlib.contextmanager
-    def _link_errors_noted(self) -> Iterator[None]:
-        try:
-            yield
-        except LinkError as error:
-            self.link_error = error
-            raise
-
-    def _require(self, radar: Radar) -> Model:
-        if radar.identity is None:
-            reason = self.link_error or radar.error
-            raise NoAnswerError(
-                f"{radar.name} is not connected: {reason or 'still searching'}")
-        return radar.identity.model
+    def _model(self, radar: Radar) -> Model:
+        """Return the model of a radar; raises NoAnswerError where it is not connected."""
+        self._require(radar)
+        assert radar.model is not None
+        return radar.model
 
     def _require_support(self, radar: Radar, command: Command[T]) -> Model:
-        model = self._require(radar)
+        model = self._model(radar)
         if not model.supports(command):
             raise SettingError(f"{model.name} cannot {command.name}")
         return model
@@ -481,7 +369,7 @@ class RadarBus:
     def _baud_candidates(self, radar: Radar) -> tuple[int, ...]:
         if self._baud_rate:
             return (self._baud_rate,)
-        if self.line.is_open and any(other.identity for other in self.devices):
+        if self.line.is_open and any(other.is_connected for other in self.devices):
             return (self.line.link.baud_rate,)
         if radar.options.model is not None:
             return (radar.options.model.baud_rate,)
@@ -557,11 +445,8 @@ class RadarBus:
             return None
 
     def _read_all(self, radar: Radar) -> None:
-        radar.read_all(_Access(self, radar), settings_of(self._require(radar)),
+        radar.read_all(_Access(self, radar), settings_of(self._model(radar)),
                        self._note_of(radar))
-
-    def _note_of(self, radar: Radar) -> Note:
-        return partial(self._listener.on_note, radar)
 
     def _execute(self, radar: Radar, command: Command[T], timeout: float = 0.0) -> T:
         return self._timed(radar, command, timeout)[0]

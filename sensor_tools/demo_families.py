@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from icotronic_driver.commands import AdcConfiguration
-from icotronic_driver.simulator import SENSOR_RANGE, vibration
+from icotronic_driver.simulated_sth import SENSOR_RANGE, vibration
 from icotronic_driver.streaming import STANDARD_GRAVITY, Calibration
+from icotronic_driver.values import AdcConfiguration
 from isys_radar_driver.models import FAST, find_model
 from isys_radar_driver.simulator import scene_of
 from msg_conversions.point_cloud import FIELD_NAMES

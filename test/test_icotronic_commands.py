@@ -14,16 +14,11 @@ from driver_common.errors import FrameError, RefusedError, SettingError
 from driver_common.settings import read_settings, write_settings
 from icotronic_driver import commands
 from icotronic_driver import settings as rows
-from icotronic_driver.commands import (
-    COMMANDS,
-    AdcConfiguration,
-    Command,
-    IcotronicRecord,
-    Request,
-    UsedSensors,
-)
+from icotronic_driver.commands import COMMANDS, IcotronicRecord
+from icotronic_driver.request import Command, Request
 from icotronic_driver.settings import nearest_adc_configuration
 from icotronic_driver.streaming import StreamFormat
+from icotronic_driver.values import AdcConfiguration, UsedSensors
 
 
 def request_of(example: Example) -> Request[Any]:

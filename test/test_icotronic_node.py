@@ -22,13 +22,13 @@ from sensor_msgs.msg import BatteryState, Imu, Temperature
 
 from driver_common.simulated_bus import CanFrame
 from icotronic_driver import commands
-from icotronic_driver.commands import AdcConfiguration
 from icotronic_driver.identifier import STU_1
 from icotronic_driver.line import STREAM_ID
 from icotronic_driver.node import IcotronicNode
 from icotronic_driver.settings import SETTINGS
 from icotronic_driver.simulator import SimulatedIcotronic, simulated_network
 from icotronic_driver.streaming import STANDARD_GRAVITY
+from icotronic_driver.values import AdcConfiguration
 
 DEADLINE = 15.0  # s; far more than anything takes, also on a busy machine
 MODULE, NAME, STATUS = "icotronic_driver.node", "/icotronic", "icotronic: sensor"

@@ -20,17 +20,20 @@ from driver_common import simulated_bus
 from driver_common.errors import DriverError, LinkError, RefusedError, WrongDeviceError
 from driver_common.simulated_bus import CanFrame
 from icotronic_driver import commands
-from icotronic_driver.commands import AdcConfiguration, Request, UsedSensors
 from icotronic_driver.eeprom import STH_EEPROM
-from icotronic_driver.simulator import (
-    SUPERVISION_TIME,
-    SimulatedIcotronic,
-    SimulatedNetwork,
-    SimulatedSth,
-    simulated_network,
-    vibration,
-)
+from icotronic_driver.request import Request
+from icotronic_driver.simulated_sth import SimulatedSth, vibration
+from icotronic_driver.simulated_stu import SUPERVISION_TIME
+from icotronic_driver.simulator import SimulatedIcotronic, SimulatedNetwork, simulated_network
 from icotronic_driver.streaming import StreamDecoder, StreamFormat, stream_format
+from icotronic_driver.values import (
+    AdcConfiguration,
+    CalibrationElement,
+    CalibrationMethod,
+    CodeLocation,
+    NetworkState,
+    UsedSensors,
+)
 
 T = TypeVar("T")
 
@@ -251,9 +254,9 @@ def test_errors() -> None:
         (commands.WRITE_ADC.with_payload(STH, b"\x80\0\4\6\x42", bytes), "unsupported format"),
         (commands.START_ACCELERATION.request(STH, StreamFormat(X, 6)), "unsupported format"),
         (commands.START_ACCELERATION.request(STH, StreamFormat(XYZ, 1, 3)), "unsupported format"),
-        (commands.WRITE_STATE.request(STH, commands.NetworkState.STARTUP), "not available"),
-        (commands.WRITE_STATE.request(STU, commands.NetworkState.OPERATING,
-                                      commands.CodeLocation.BOOTLOADER), "wrong subscriber"),
+        (commands.WRITE_STATE.request(STH, NetworkState.STARTUP), "not available"),
+        (commands.WRITE_STATE.request(STU, NetworkState.OPERATING, CodeLocation.BOOTLOADER),
+         "wrong subscriber"),
         (commands.READ_STH_STATUS.with_payload(STH, bytes(4) + b"\xff", bytes), "error 01"),
         (commands.READ_CALIBRATION_K.request(STH, 99, 1), "not available"),  # type: ignore[arg-type]
     ]
@@ -323,7 +326,7 @@ def test_an_eeprom_that_was_never_initialized_gets_the_defaults() -> None:  # se
 def test_calibration_lies_in_the_eeprom() -> None:
     host = Host().connect()
     field = STH_EEPROM["Acceleration Z: Offset"]
-    element = commands.CalibrationElement.ACCELERATION
+    element = CalibrationElement.ACCELERATION
     assert host.ask(commands.READ_CALIBRATION_D.request(STH, element, 3)) == -100.0
     host.ask(commands.WRITE_CALIBRATION_D.request(STH, element, 3, -50.0))
     read = commands.READ_EEPROM.request(STH, field.page, field.offset, field.length)
@@ -352,9 +355,9 @@ def test_a_reset_loses_the_ram_and_the_connection() -> None:
     assert host.ask(commands.READ_UNDER_VOLTAGES.request(STH)) == 1
     host.ask(commands.RESET.request(STU))
     host.wait(0.2)
-    assert host.ask(commands.READ_STATE.request(STU)).state is commands.NetworkState.STARTUP
+    assert host.ask(commands.READ_STATE.request(STU)).state is NetworkState.STARTUP
     host.wait(0.2)
-    assert host.ask(commands.READ_STATE.request(STU)).state is commands.NetworkState.OPERATING
+    assert host.ask(commands.READ_STATE.request(STU)).state is NetworkState.OPERATING
     assert not host.ask(commands.CHECK_CONNECTED.request(STU))
 
 
@@ -367,16 +370,16 @@ def test_measurements() -> None:
     assert host.ask(commands.read_acceleration(STH)) == (32768, 32768, 32768)
     (raw,) = host.ask(commands.read_voltage(STH))
     assert raw == round(2.9 / 5.7 / 3.3 * 65535)
-    element = commands.CalibrationElement
+    element = CalibrationElement
     assert host.ask(commands.MEASURE.request(STH, element.GROUND)) == 0
     assert host.ask(commands.MEASURE.request(STH, element.SUPPLY)) == 65535
     assert host.ask(commands.MEASURE.request(STH, element.SUPPLY, 1, 6.6)) == 32768
     host.ask(commands.MEASURE.request(STH, element.ACCELERATION, 1, 3.3,
-                                      commands.CalibrationMethod.ACTIVATE))
+                                      CalibrationMethod.ACTIVATE))
     assert host.ask(commands.MEASURE.request(STH, element.ACCELERATION)) == round(
         1.75 / 3.3 * 65535)
     host.ask(commands.MEASURE.request(STH, element.ACCELERATION, 1, 3.3,
-                                      commands.CalibrationMethod.DEACTIVATE))
+                                      CalibrationMethod.DEACTIVATE))
     host.ask(commands.WRITE_ADC.request(STH, AdcConfiguration(reference_voltage=6.6)))
     assert host.ask(commands.read_acceleration(STH, X)) == (16384,)
     host.ask(commands.WRITE_USED_SENSORS.request(STH, UsedSensors(4, 0, 5)))

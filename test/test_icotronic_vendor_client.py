@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from icotronic_driver.commands import AdcConfiguration
-from icotronic_driver.simulator import simulated_network, vibration
+from icotronic_driver.simulated_sth import vibration
+from icotronic_driver.simulator import simulated_network
+from icotronic_driver.values import AdcConfiguration
 
 pytestmark = pytest.mark.skipif(
     importlib.util.find_spec("icotronic") is None,

@@ -17,12 +17,7 @@ from isys_master import (
     half_a_step,
 )
 
-from driver_common.errors import (
-    NoAnswerError,
-    RefusedError,
-    SettingError,
-    WrongDeviceError,
-)
+from driver_common.errors import NoAnswerError, RefusedError, SettingError, WrongDeviceError
 from driver_common.simulated_line import Faults
 from isys_radar_driver import commands, session
 from isys_radar_driver.commands import Location
@@ -445,7 +440,7 @@ def test_a_wanted_setting_that_needs_it_is_written_while_the_radar_measures(star
 def test_target_lists_are_what_was_in_front_of_the_radar(connect, model, bits):
     master, _, simulated = connect(model, resolution=bits)
     truth = Truth(simulated)
-    master.measure(2 if master.radar.cycle_time < 0.3 else 1)
+    master.measure(3 if master.radar.cycle_time < 0.1 else 1)
     tolerance = half_a_step(model, bits)
     truth.confirm(master.heard.lists, tolerance)
     for _, measured, stamp in master.heard.lists:  # the truth moves 20 m/s at most
@@ -603,6 +598,17 @@ def test_acquisition_of_one_radar_can_be_stopped_and_started(connect):
     master.bus.set_enabled(master.radar, True)
     assert simulated.measuring
     master.measure(2)
+
+
+@pytest.mark.parametrize("active", [True, False])
+def test_a_radar_that_misses_start_or_stop_is_told_again(connect, active):
+    master, line, simulated = connect()
+    master.bus.set_active(not active)
+    line.faults.silent = True
+    master.bus.set_active(active)
+    line.faults.silent = False
+    master.until(lambda: simulated.measuring is master.radar.measuring is active)
+    assert master.heard.lost == []
 
 
 @pytest.mark.parametrize("model", ["iSYS-5010", "iSYS-5011", "iSYS-5020", "iSYS-5021", "iSYS-5110"])

@@ -6,6 +6,7 @@ import os
 import socket
 import stat
 import threading
+import time
 import tty
 
 import pytest
@@ -56,10 +57,10 @@ def link(terminal):
     link.close()
 
 
-def read_all(link, count):
+def read_all(link, count, timeout=DEADLINE):
     data = b""
     while len(data) < count:
-        more = link.read(DEADLINE)
+        more = link.read(timeout)
         assert more
         data += more
     return data
@@ -69,6 +70,16 @@ def error_of(port, baud_rate=115200):
     with pytest.raises(LinkError) as caught:
         SerialLink(port, baud_rate)
     return str(caught.value)
+
+
+def test_a_host_that_was_held_up_waits_once_more(terminal, link, monkeypatch):
+    real = time.monotonic
+    times = iter([real()])  # the wait of 10 ms seems to take 5 s more
+    monkeypatch.setattr(time, "monotonic", lambda: next(times, None) or real() + 5.0)
+    late = threading.Timer(0.1, terminal.write, [b"late"])
+    late.start()
+    assert read_all(link, 4, timeout=0.01) == b"late"
+    late.join()
 
 
 def test_bytes_go_out_and_come_in_unchanged(terminal, link):

@@ -375,7 +375,7 @@ def test_diagnostics_of_a_sensor_that_is_silent(simulated, uc4000, heard, ros):
 def test_deactivated_cleaned_up_and_back(simulated, uc4000, heard, ros):
     assert uc4000.change_state("deactivate")
     begun = simulated["left"].measurements[-1]
-    status = ros.wait_for_status("uc4000: left", lambda status: "not measuring" in status.message)
+    status = ros.wait_for_status("uc4000: left", lambda status: "stopped" in status.message)
     assert status.level == OK
     assert simulated["left"].measurements[-1] == begun
     assert uc4000.change_state("cleanup")

@@ -715,7 +715,7 @@ def test_a_lost_sensor_returns_configured_as_before(connect):
     master.find()
     assert simulated.value("gain_db") == 60.0
     assert simulated.value("temperature_compensation") == "off"
-    assert master.sensor.statistics.connections == 2
+    assert master.sensor.connections == 2
 
 
 def test_a_short_loss_of_power_is_noticed_by_one_missing_reply(connect):

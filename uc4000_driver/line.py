@@ -250,17 +250,17 @@ class Line:
 
         A reply that has begun may finish, as long as its bytes keep coming.
         """
-        while not parser.complete and (parser.pending or time.monotonic() < deadline):
+        while not parser.complete and time.monotonic() < deadline + NOISE_TIME:
             if self._interrupted.is_set():
                 raise LinkError("the driver is stopping")
-            if time.monotonic() > deadline + NOISE_TIME:
-                break
             remaining = max(0.0, deadline - time.monotonic())
             data = self.link.read(BYTE_GAP if parser.pending else min(SLICE, remaining))
             if data:
                 parser.feed(data, time.monotonic())
             elif parser.pending:
                 parser.gap()
+            elif not remaining:
+                break
         if parser.complete:
             parser.feed(self.link.read(GAP))  # the silence that the next request needs anyway
 

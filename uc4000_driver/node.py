@@ -12,9 +12,7 @@ from sensor_msgs.msg import Range, Temperature
 
 from driver_common import diagnostics
 from driver_common.device_node import DeviceNode, run
-from driver_common.errors import DriverError, SettingError
 from driver_common.settings import Option
-from driver_common.simulated_line import SimulatedLine
 from msg_conversions.range import NO_ECHO_VALUES, distance_or_no_echo, to_range
 from msg_conversions.temperature import to_temperature
 from uc4000_driver.commands import MAX_CYCLES, PROFILES, Outcome
@@ -75,7 +73,6 @@ class Uc4000Node(DeviceNode, Listener):
 
     def __init__(self) -> None:
         """Declare the parameters; raises SettingError."""
-        self._simulator: SimulatedLine | None = None
         self._publishers_of: dict[str, dict[str, Any]] = {}
         super().__init__("uc4000")
 
@@ -86,19 +83,14 @@ class Uc4000Node(DeviceNode, Listener):
         options = [self._sensor_options(sensor) for sensor in self.sensors]
         port: str = self.option("serial_port")
         if port.startswith(SIMULATED):
-            self._simulator, _ = simulated_line(
+            simulator, _ = simulated_line(
                 [option.address for option in options if option.address],
                 product=port.removeprefix(SIMULATED))
-            self._simulator.faults.echo = self.option("local_echo") == "on"
-            port = self._simulator.start().port
+            simulator.faults.echo = self.option("local_echo") == "on"
+            self.simulator = simulator
+            port = simulator.start().port
         return Uc4000Bus(port, options, self, local_echo=self.option("local_echo"),
                          groups=self.option("groups"))
-
-    def release(self) -> None:
-        """End the simulator."""
-        if self._simulator is not None:
-            self._simulator.close()
-            self._simulator = None
 
     def _sensor_options(self, sensor: str) -> Options:
         options = Options(
@@ -123,40 +115,19 @@ class Uc4000Node(DeviceNode, Listener):
 
     def make_interfaces(self, sensor: str) -> None:
         """Create topics and services of a sensor."""
+        super().make_interfaces(sensor)
         self._publishers_of[sensor] = {
             "range": self.add_publisher(Range, sensor, "range"),
             "temperature": self.add_publisher(Temperature, sensor, "temperature")}
-        self.add_trigger(sensor, "identify", lambda: self._identify(self._sensor(sensor)))
+        self.add_trigger(sensor, "identify", lambda: self._identify(self.device(sensor)))
         self.add_trigger(sensor, "assign_address",
-                         lambda: self._assign_address(self._sensor(sensor)))
-
-    def _sensor(self, name: str) -> Sensor:
-        sensor: Sensor = next(
-            sensor for sensor in self.bus.devices if sensor.options.name == name)
-        return sensor
+                         lambda: self._assign_address(self.device(sensor)))
 
     # --- what the bus reports, in its thread ---
 
-    def on_found(self, sensor: Sensor) -> None:
-        """Show the sensor's settings as parameters."""
-        self.get_logger().info(f"{self._title(sensor)}: connected to {sensor.identity}, address "
-                               f"{sensor.address}")
-        self.show_settings(sensor.options.name, sensor)
-
-    def on_values(self, sensor: Sensor) -> None:
-        """Show the values that were read again."""
-        self.show_settings(sensor.options.name, sensor)
-
-    def on_lost(self, sensor: Sensor, error: DriverError) -> None:
-        """Log why there is no sensor."""
-        self.get_logger().error(f"{self._title(sensor)}: {error} (waiting for it)")
-
-    def on_note(self, sensor: Sensor, text: str, *, warning: bool = False) -> None:
-        """Log a line."""
-        if warning:  # rclpy takes one severity per line of code only
-            self.get_logger().warning(f"{self._title(sensor)}: {text}")
-        else:
-            self.get_logger().info(f"{self._title(sensor)}: {text}")
+    def describe(self, sensor: Sensor) -> str:
+        """Return identity and address."""
+        return f"{sensor.identity}, address {sensor.address}"
 
     def on_measurement(self, sensor: Sensor, measurement: Measurement) -> None:
         """Publish the distance."""
@@ -181,27 +152,15 @@ class Uc4000Node(DeviceNode, Listener):
         offset: float = self.option("time_offset", name)
         return self.option("frame_id", name), stamp + round(offset * 1e9)
 
-    @staticmethod
-    def _title(sensor: Sensor) -> str:
-        return sensor.options.name or "sensor"
-
     # --- services, in the executor ---
 
     def _identify(self, sensor: Sensor) -> str:
-        identity = self.call(lambda: self.bus.identify(sensor))
-        return f"{identity}, address {sensor.address}"
+        self.call(lambda: self.bus.identify(sensor))
+        return self.describe(sensor)
 
     def _assign_address(self, sensor: Sensor) -> str:
-        name = sensor.options.name
-        prefix = self.prefix(name)
-        address = self.option("new_address", name)
-        if not address:
-            raise SettingError(f"set the parameter {prefix}new_address first")
-        old = sensor.address
-        self.call(lambda: self.bus.assign_address(sensor, address))
-        self.store.store({prefix + "address": address, prefix + "new_address": 0})
-        return (f"the sensor moved from address {old} to {address} and keeps it; put "
-                f"'{prefix}address: {address}' into your parameter file")
+        return self.give_address(sensor.options.name,
+                                 lambda address: self.bus.assign_address(sensor, address))
 
     # --- diagnostics ---
 
@@ -221,15 +180,14 @@ class Uc4000Node(DeviceNode, Listener):
             "time-outs": counts.timeouts, "checksum errors": counts.damaged,
             **{f"refusals: {error_text(code)}": count
                for code, count in sorted(counts.refusals.items())},
-            "refusals": counts.refusals.total(), "connections": counts.connections,
+            "refusals": counts.refusals.total(), "connections": sensor.connections,
             "stray bytes": line.stray_bytes,
             "local echo": {None: "unknown", True: "on", False: "off"}[line.echo]}
         for group in self.bus.groups:
             if sensor.options.name in group.names:
                 values["failed measurements of its group"] = group.failures
-        values |= {f"{name} differs": f"wanted {wanted}, reported {reported}"
-                   for name, (wanted, reported) in sensor.differing.items()}
-        name = f"{self.get_name()}: {self._title(sensor)}"
+        values |= sensor.differences
+        name = f"{self.get_name()}: {sensor.title}"
         hardware_id = f"{sensor.product} {identity.serial_number}" if identity else ""
         return diagnostics.to_status(name, hardware_id, *self._health(sensor), values)
 
@@ -247,8 +205,8 @@ class Uc4000Node(DeviceNode, Listener):
         if sensor.temperature is not None and not low <= sensor.temperature <= high:
             return diagnostics.WARN, (f"{sensor.temperature:g} °C is outside of the operating "
                                       f"range {low} … {high} °C")
-        if not self.bus.active:
-            return diagnostics.OK, "connected, not measuring"
+        if not self.bus.wants(sensor):
+            return diagnostics.OK, "connected, acquisition stopped"
         message = f"{sensor.rate:.1f} measurements per second"
         if len(sensor.arrivals) > 2 and sensor.rate < 0.9 * sensor.options.rate:
             return diagnostics.WARN, f"{message} instead of {sensor.options.rate:g}"

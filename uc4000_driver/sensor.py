@@ -50,7 +50,6 @@ class Statistics:
     refusals: Counter[int] = field(default_factory=Counter)  # by error code
     timeouts: int = 0
     damaged: int = 0
-    connections: int = 0
 
 
 @dataclass
@@ -81,29 +80,31 @@ class Sensor(Device):
         identity: Who it is; None while it is not connected.
         temperature: In °C; None while it was not read.
         acknowledged: What was written where nothing can be read, by the record's name.
-        served: Monotonic time in s of the last step.
         temperature_due: Monotonic time in s at which to read the temperature.
-        misses: Number of steps without a good answer.
     """
+
+    options: Options
 
     def __init__(self, options: Options) -> None:
         """Begin as an unknown sensor."""
         super().__init__(options)
-        self.options = options
         self.address = options.address
         self.identity: Identity | None = None
         self.temperature: float | None = None
         self.acknowledged: dict[str, Raw] = {}
         self.statistics = Statistics()
         self.arrivals: deque[float] = deque()
-        self.served = 0.0
         self.temperature_due = 0.0
-        self.misses = 0
 
     def __str__(self) -> str:
         """Return name and address for messages."""
         where = f"address {self.address}" if self.address else "sensor"
         return f"{self.options.name} ({where})" if self.options.name else where
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether it was found, identified and configured."""
+        return self.identity is not None
 
     @property
     def product(self) -> str:
@@ -144,9 +145,9 @@ class Sensor(Device):
 
     def forget(self) -> None:
         """Take note that the sensor is not connected any more."""
+        super().forget()
         self.identity = None
         self.temperature = None
         self.acknowledged.clear()
         self.arrivals.clear()
-        self.misses = 0
         self.address = self.options.address

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from typing import TypeVar
 
-from driver_common.device import Note
+from driver_common import device_bus
+from driver_common.device_bus import DeviceBus
 from driver_common.device_thread import Backoff
 from driver_common.errors import (
     DriverError,
@@ -34,25 +34,12 @@ from uc4000_driver.telegram import CAST, FIRST_ADDRESS, LAST_ADDRESS
 T = TypeVar("T")
 
 ATTEMPTS = 2
-MISSES_UNTIL_LOST = 3
 KEEP_ALIVE = 1.0  # s between requests to a sensor that is not measuring
 OPERATING_TEMPERATURE = (-25, 70)  # °C, section 2.1
 
 
-class Listener:
+class Listener(device_bus.Listener[Sensor]):
     """What a user of the bus wants to hear; all called in the thread of the bus."""
-
-    def on_found(self, sensor: Sensor) -> None:
-        """Tell that the sensor was identified and configured."""
-
-    def on_values(self, sensor: Sensor) -> None:
-        """Tell that values of settings were read again."""
-
-    def on_lost(self, sensor: Sensor, error: DriverError) -> None:
-        """Tell that the sensor is not there (any more), once per change of the reason."""
-
-    def on_note(self, sensor: Sensor, text: str, *, warning: bool = False) -> None:
-        """Tell something worth a line in the log."""
 
     def on_measurement(self, sensor: Sensor, measurement: Measurement) -> None:
         """Take a measurement."""
@@ -96,16 +83,15 @@ def make_groups(texts: Iterable[str], names: Sequence[str]) -> list[Group]:
     return groups
 
 
-class Uc4000Bus:
+class Uc4000Bus(DeviceBus[Sensor]):
     """Several sensors on one wire, or one.
 
     Attributes:
         line: The wire.
-        devices: The sensors.
         groups: Those that may measure together.
-        active: Whether to measure.
-        link_error: Why the port is not open.
     """
+
+    _listener: Listener
 
     def __init__(self, port: str, sensors: Iterable[Options], listener: Listener, *,
                  local_echo: str = "auto", groups: Iterable[str] = ()) -> None:
@@ -121,13 +107,10 @@ class Uc4000Bus:
         Raises:
             SettingError: Addresses or groups do not fit.
         """
+        super().__init__(map(Sensor, sensors), listener)
         self.line = Line(port, local_echo)
-        self.devices = [Sensor(options) for options in sensors]
         self._check_addresses()
         self.groups = make_groups(groups, [sensor.options.name for sensor in self.devices])
-        self.link_error: LinkError | None = None
-        self._listener = listener
-        self.active = False
 
     def _check_addresses(self) -> None:
         addresses = [sensor.options.address for sensor in self.devices]
@@ -141,24 +124,6 @@ class Uc4000Bus:
 
     # --- what the thread of the bus calls ---
 
-    def open(self) -> None:
-        """Open the port; raises LinkError."""
-        with self._link_errors_noted():
-            self.line.open()
-        self.link_error = None
-        for sensor in self.devices:
-            sensor.due = 0.0
-            sensor.backoff.reset()
-
-    def poll(self) -> float:
-        """Serve the sensor that has waited longest; return the time in s until the next turn."""
-        now = time.monotonic()
-        due = [sensor for sensor in self.devices if sensor.due <= now]
-        if due:
-            with self._link_errors_noted():
-                self._serve(min(due, key=lambda sensor: sensor.served))
-        return max(0.0, min(sensor.due for sensor in self.devices) - time.monotonic())
-
     def close(self) -> None:
         """Close the port; a sensor measures only when asked, so there is nothing to stop."""
         for sensor in self.devices:
@@ -170,14 +135,6 @@ class Uc4000Bus:
         self.line.interrupt()
 
     # --- what a user calls, through the thread ---
-
-    def set_active(self, active: bool) -> None:
-        """Measure, or only look whether the sensors are there."""
-        self.active = active
-        for sensor in self.devices:
-            sensor.arrivals.clear()
-            if sensor.identity is not None:
-                sensor.due = 0.0
 
     def write(self, sensor: Sensor, changes: Mapping[str, Value]) -> dict[str, Value]:
         """Write settings, all or none, and return what the sensor reports.
@@ -220,16 +177,15 @@ class Uc4000Bus:
 
     # --- life of a sensor ---
 
-    def _serve(self, sensor: Sensor) -> None:
-        """Do the sensor's next step; only a LinkError gets out."""
-        sensor.served = time.monotonic()
-        if sensor.identity is None:
-            self._find_or_wait(sensor)
-            return
+    def _open_link(self) -> None:
+        self.line.open()
+
+    def _attend(self, sensor: Sensor) -> None:
+        """Measure, or look whether the sensor is there."""
         try:
             if sensor.misses:
                 self._look_again(sensor)
-            if self.active:
+            if self.wants(sensor):
                 if sensor.wants_temperature:
                     self._read_temperature(sensor)
                 self._measure_with_others(sensor)
@@ -237,25 +193,14 @@ class Uc4000Bus:
                 self._check_address(sensor)
                 sensor.due = time.monotonic() + KEEP_ALIVE
             self._note_well(sensor)
-        except LinkError:
-            raise
         except RefusedError as error:
             self._note_refusal(sensor, error)
         except (NoAnswerError, FrameError) as error:
-            sensor.misses += 1
-            if sensor.misses >= MISSES_UNTIL_LOST:
-                self._lose(sensor, error)
-            elif sensor.misses > 1:
-                sensor.due = time.monotonic() + self._pause(sensor)
-        except DriverError as error:
-            self._lose(sensor, error)
+            self._note_miss(sensor, error)
 
-    def _note_well(self, sensor: Sensor) -> None:
-        sensor.misses = 0
-        sensor.backoff.reset()
-        if sensor.error is not None:
-            sensor.error = None
-            self._listener.on_note(sensor, "is well again")
+    def _start_or_stop(self, sensor: Sensor) -> None:
+        """Begin or end to count the rate; a sensor measures only when asked."""
+        sensor.arrivals.clear()
 
     def _note_refusal(self, sensor: Sensor, error: RefusedError) -> None:
         """Ask a sensor that refuses ever more rarely."""
@@ -263,30 +208,6 @@ class Uc4000Bus:
             self._listener.on_note(sensor, f"{error}; it is asked again", warning=True)
         sensor.error = error
         sensor.due = time.monotonic() + self._pause(sensor)
-
-    def _find_or_wait(self, sensor: Sensor) -> None:
-        try:
-            self._find(sensor)
-        except LinkError:
-            raise
-        except DriverError as error:
-            self._lose(sensor, self._explained(sensor, error))
-
-    def _lose(self, sensor: Sensor, error: DriverError) -> None:
-        """Note that the sensor is not there; ask for it more and more rarely."""
-        news = sensor.identity is not None or str(sensor.error) != str(error)
-        sensor.forget()
-        sensor.error = error
-        sensor.due = time.monotonic() + self._pause(sensor)
-        if news:
-            self._listener.on_lost(sensor, error)
-
-    def _pause(self, sensor: Sensor) -> float:
-        """Return how long to leave a sensor alone that does not do what it should."""
-        others_work = any(other.identity and not other.error
-                          for other in self.devices if other is not sensor)
-        sensor.backoff.last = 10.0 if others_work else 2.0
-        return sensor.backoff.pause()
 
     def _find(self, sensor: Sensor) -> None:
         """Find the sensor, identify and configure it."""
@@ -300,11 +221,8 @@ class Uc4000Bus:
         except DriverError:
             sensor.identity = None
             raise
-        sensor.error = None
         sensor.due = sensor.temperature_due = 0.0
-        sensor.backoff.reset()
-        sensor.statistics.connections += 1
-        self._listener.on_found(sensor)
+        self._note_found(sensor)
 
     def _identify(self, sensor: Sensor) -> Identity:
         version = self._execute(sensor, commands.READ_VERSION)
@@ -343,9 +261,6 @@ class Uc4000Bus:
                 self._listener.on_note(sensor, f"the code that it reports for {name} is not in "
                                        "table A1 of the manual", warning=True)
         sensor.make_as_wanted(lambda changes: self.write(sensor, changes), self._note_of(sensor))
-
-    def _note_of(self, sensor: Sensor) -> Note:
-        return partial(self._listener.on_note, sensor)
 
     # --- measuring ---
 
@@ -419,19 +334,6 @@ class Uc4000Bus:
         self._listener.on_measurement(sensor, Measurement(distance, profile, sent + half))
 
     # --- requests ---
-
-    @contextlib.contextmanager
-    def _link_errors_noted(self) -> Iterator[None]:
-        try:
-            yield
-        except LinkError as error:
-            self.link_error = error
-            raise
-
-    def _require(self, sensor: Sensor) -> None:
-        if sensor.identity is None:
-            reason = self.link_error or sensor.error
-            raise NoAnswerError(f"{sensor} is not connected: {reason or 'still searching'}")
 
     def _ask_address(self) -> int:
         """Ask for the address by cast; one sensor on the wire may answer (section 5.1.6.3)."""

@@ -1,0 +1,201 @@
+"""What the sessions of all drivers share: devices are found, served in turn, lost, waited for."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Iterable, Iterator
+from functools import partial
+from typing import Generic, TypeVar
+
+from driver_common.device import Device, Note
+from driver_common.errors import (
+    DriverError,
+    FrameError,
+    LinkError,
+    NoAnswerError,
+    RefusedError,
+    SettingError,
+)
+
+DeviceT = TypeVar("DeviceT", bound=Device)
+
+MISSES_UNTIL_LOST = 3
+
+
+class Listener(Generic[DeviceT]):
+    """What a user of a bus wants to hear; all called in the thread of the bus."""
+
+    def on_found(self, device: DeviceT) -> None:
+        """Tell that the device was identified and configured."""
+
+    def on_values(self, device: DeviceT) -> None:
+        """Tell that values of settings were read again."""
+
+    def on_lost(self, device: DeviceT, error: DriverError) -> None:
+        """Tell that the device is not there (any more), once per change of the reason."""
+
+    def on_note(self, device: DeviceT, text: str, *, warning: bool = False) -> None:
+        """Tell something worth a line in the log."""
+
+
+class DeviceBus(Generic[DeviceT]):
+    """One or several devices on a link, each in its turn.
+
+    Attributes:
+        devices: The devices.
+        active: Whether to measure.
+        link_error: Why the link is not open.
+    """
+
+    def __init__(self, devices: Iterable[DeviceT], listener: Listener[DeviceT]) -> None:
+        """Prepare the bus; nothing is opened."""
+        self.devices = list(devices)
+        self.active = False
+        self.link_error: LinkError | None = None
+        self._listener = listener
+
+    # --- what a driver provides ---
+
+    def _open_link(self) -> None:
+        """Open the link; raises LinkError."""
+        raise NotImplementedError
+
+    def _find(self, device: DeviceT) -> None:
+        """Do the next step until it is found, identified and configured; raises DriverError."""
+        raise NotImplementedError
+
+    def _attend(self, device: DeviceT) -> None:
+        """Do the next step with a connected device; it is lost by any DriverError."""
+        raise NotImplementedError
+
+    def _start_or_stop(self, device: DeviceT) -> None:
+        """Have a connected device measure, or not, as `wants` says; raises DriverError."""
+        raise NotImplementedError
+
+    def _explained(self, device: DeviceT, error: DriverError) -> DriverError:
+        """Add what can be found out about the reason why a device was not found."""
+        return error
+
+    def _gist(self, error: DriverError | None) -> str:
+        """Return what of an error is news."""
+        return str(error)
+
+    # --- what the thread of the bus calls ---
+
+    def open(self) -> None:
+        """Open the link; raises LinkError."""
+        with self._link_errors_noted():
+            self._open_link()
+        self.link_error = None
+        for device in self.devices:
+            device.due = 0.0
+            device.backoff.reset()
+
+    def poll(self) -> float:
+        """Serve the device that has waited longest; return the time in s until the next turn."""
+        now = time.monotonic()
+        due = [device for device in self.devices if device.due <= now]
+        if due:
+            with self._link_errors_noted():
+                self._serve(min(due, key=lambda device: device.served))
+        return max(0.0, min(device.due for device in self.devices) - time.monotonic())
+
+    # --- what a user calls, through the thread ---
+
+    def set_active(self, active: bool) -> None:
+        """Start or stop measuring, now and after every reconnection.
+
+        A device that does not do so now is told again in its next turn.
+        """
+        self.active = active
+        for device in self.devices:
+            if device.is_connected:
+                device.due = 0.0
+                with contextlib.suppress(NoAnswerError, FrameError, RefusedError):
+                    self._start_or_stop(device)
+
+    def set_enabled(self, device: DeviceT, enabled: bool) -> None:
+        """Start or stop one device; raises DriverError."""
+        self._require(device)
+        if enabled and not self.active:
+            raise SettingError("the node is not active, so nothing would be published; "
+                               "activate it first")
+        device.enabled = enabled
+        device.due = 0.0
+        self._start_or_stop(device)
+
+    # --- life of a device ---
+
+    def _serve(self, device: DeviceT) -> None:
+        """Do the next step with a device; only a LinkError gets out."""
+        device.served = time.monotonic()
+        connected = device.is_connected
+        try:
+            if connected:
+                self._attend(device)
+            else:
+                self._find(device)
+        except LinkError:
+            raise
+        except DriverError as error:
+            self._lose(device, error if connected else self._explained(device, error))
+
+    def wants(self, device: DeviceT) -> bool:
+        """Whether a device is to measure."""
+        return self.active and device.enabled
+
+    def _note_found(self, device: DeviceT) -> None:
+        """Take note that a device was found, identified and configured."""
+        device.error = None
+        device.backoff.reset()
+        device.connections += 1
+        self._listener.on_found(device)
+
+    def _note_well(self, device: DeviceT) -> None:
+        """Take note that a device does what it should."""
+        device.misses = 0
+        device.backoff.reset()
+        if device.error is not None:
+            device.error = None
+            self._listener.on_note(device, "is well again")
+
+    def _note_miss(self, device: DeviceT, error: DriverError) -> None:
+        """Ask a device again that did not answer; raises the error after too many times."""
+        device.misses += 1
+        if device.misses >= MISSES_UNTIL_LOST:
+            raise error
+        device.due = time.monotonic() + self._pause(device) if device.misses > 1 else 0.0
+
+    def _lose(self, device: DeviceT, error: DriverError) -> None:
+        """Note that a device is not there; it is looked for more and more rarely."""
+        news = device.is_connected or self._gist(device.error) != self._gist(error)
+        device.forget()
+        device.error = error
+        device.due = time.monotonic() + self._pause(device)
+        if news:
+            self._listener.on_lost(device, error)
+
+    def _pause(self, device: DeviceT) -> float:
+        """Return how long to leave a device alone that does not do what it should."""
+        others_work = any(other.is_connected and not other.error
+                          for other in self.devices if other is not device)
+        device.backoff.last = 10.0 if others_work else 2.0
+        return device.backoff.pause()
+
+    def _require(self, device: DeviceT) -> None:
+        """Raise NoAnswerError where a device is not connected."""
+        if not device.is_connected:
+            reason = self.link_error or device.error or "still searching"
+            raise NoAnswerError(f"{device} is not connected: {reason}")
+
+    def _note_of(self, device: DeviceT) -> Note:
+        return partial(self._listener.on_note, device)
+
+    @contextlib.contextmanager
+    def _link_errors_noted(self) -> Iterator[None]:
+        try:
+            yield
+        except LinkError as error:
+            self.link_error = error
+            raise
