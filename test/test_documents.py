@@ -1,6 +1,7 @@
 """Files beside the code: they fit the tables of the drivers, and the programs that read them."""
 
 import re
+import runpy
 from pathlib import Path
 
 import pytest
@@ -95,13 +96,24 @@ def test_settings_that_differ_by_a_number_share_a_line(rows_, text):
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "launch").glob("*.py")), ids=lambda p: p.name)
-def test_launch_files_compile_and_start_what_there_is(path):
+def test_launch_files_start_what_there_is(path):
     text = path.read_text()
     compile(text, str(path), "exec")
-    programs = re.findall(r'executable="(\w+)"', text)
-    assert programs
-    for program in programs:
-        assert f'"{program} = ' in (ROOT / "setup.py").read_text()
+    ((program, name),) = re.findall(r'describe_driver\("(\w+)", "(\w+)"', text)
+    assert f'"{program} = ' in (ROOT / "setup.py").read_text()
+    assert (ROOT / "config" / f"{name}.yaml").exists()
+    assert path.name == f"{name}.launch.py"
+
+
+@pytest.mark.parametrize(("name", "link"), [
+    ("isys_radar", {"serial_port"}), ("uc4000", {"serial_port"}),
+    ("icotronic", {"can_interface", "can_channel"})])
+def test_launch_files_have_arguments(name, link):
+    pytest.importorskip("launch_ros.actions", reason="launch comes with a sourced ROS only")
+    content = runpy.run_path(str(ROOT / "launch" / f"{name}.launch.py"))
+    arguments = content["generate_launch_description"]().get_launch_arguments()
+    assert {argument.name for argument in arguments} == {
+        "params_file", "namespace", "name", *link}
 
 
 def test_rviz_shows_the_points_of_the_radar():

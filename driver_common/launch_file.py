@@ -1,0 +1,45 @@
+"""What the launch files of all drivers share."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from launch import LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch_ros.actions import Node
+from launch_ros.substitutions import FindPackageShare
+
+PACKAGE = "industrial_sensor_drivers"
+
+
+def describe_driver(executable: str, name: str, link: Mapping[str, str]) -> LaunchDescription:
+    """Return the description that starts one driver; it connects and measures by itself.
+
+    Its arguments are `params_file`, `name`, `namespace` and those of `link`.
+
+    Args:
+        executable: The program.
+        name: Name of the node, and of its parameter file in config/.
+        link: Parameters that may be given as arguments and then count more than the file: name
+            and description.
+    """
+    def make_node(context: LaunchContext) -> list[Node]:
+        values = {key: LaunchConfiguration(key).perform(context) for key in link}
+        given = {key: value for key, value in values.items() if value}
+        return [Node(
+            package=PACKAGE, executable=executable, output="screen",
+            name=LaunchConfiguration("name"), namespace=LaunchConfiguration("namespace"),
+            parameters=[LaunchConfiguration("params_file"), *([given] if given else [])])]
+
+    params_file = PathJoinSubstitution([FindPackageShare(PACKAGE), "config", f"{name}.yaml"])
+    return LaunchDescription([
+        DeclareLaunchArgument("params_file", default_value=params_file,
+                              description="Parameter file."),
+        *(DeclareLaunchArgument(key, default_value="",
+                                description=f"{description}; empty = from the file.")
+          for key, description in link.items()),
+        DeclareLaunchArgument("namespace", default_value="", description="Of the node."),
+        DeclareLaunchArgument("name", default_value=name, description="Of the node."),
+        OpaqueFunction(function=make_node),
+    ])
