@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 import time
 
+from bus_master import BusMaster, BusRecorder
+
 from driver_common.simulated_line import Faults
 from isys_radar_driver import simulator
 from isys_radar_driver.frames import FrameParser
@@ -17,34 +19,18 @@ from isys_radar_driver.radar import Options
 from isys_radar_driver.session import Listener, RadarBus
 from isys_radar_driver.simulator import simulated_line
 
-DEADLINE = 15.0  # s; far more than anything takes, also on a busy machine
 FAST_LINE = 921600  # Bd, where the line's speed does not matter
 
 
-class Recorder(Listener):
+class Recorder(BusRecorder, Listener):
     """Remembers what the bus tells."""
 
     def __init__(self):
-        self.found = []
-        self.lost = []
-        self.notes = []
+        super().__init__()
         self.lists = []
         self.range_lists = []
         self.digital_outputs = []
         self.temperatures = []
-        self.values = []
-
-    def on_found(self, radar):
-        self.found.append(radar)
-
-    def on_values(self, radar):
-        self.values.append(dict(radar.values))
-
-    def on_lost(self, radar, error):
-        self.lost.append((radar.options.name, error))
-
-    def on_note(self, radar, text, *, warning=False):
-        self.notes.append(text)
 
     def on_target_list(self, radar, targets, stamp):
         self.lists.append((radar.options.name, targets, stamp))
@@ -59,28 +45,14 @@ class Recorder(Listener):
         self.temperatures.append(dict(radar.temperatures))
 
 
-class Master:
+class Master(BusMaster):
     """A bus that the test polls."""
 
     def __init__(self, port, *options, baud_rate=0):
-        self.heard = Recorder()
-        self.bus = RadarBus(port, baud_rate, options or [Options()], self.heard)
-        self.radar = self.bus.devices[0]
+        heard = Recorder()
+        super().__init__(RadarBus(port, baud_rate, options or [Options()], heard), heard)
+        self.radar = self.device
         self.bus.open()
-
-    def until(self, condition):
-        """Poll until the condition holds."""
-        deadline = time.monotonic() + DEADLINE
-        while not condition():
-            assert time.monotonic() < deadline, (
-                f"not within {DEADLINE} s; lost: {self.heard.lost}, notes: {self.heard.notes}")
-            time.sleep(min(self.bus.poll(), 0.02))
-
-    def find(self):
-        """Poll until every radar is found; that one was not at once is forgotten."""
-        self.until(lambda: all(radar.identity for radar in self.bus.devices))
-        self.heard.lost.clear()
-        return self
 
     def measure(self, count=1):
         """Start measuring and return that many new target lists."""
@@ -92,12 +64,6 @@ class Master:
         start = len(self.heard.lists)
         self.until(lambda: len(self.heard.lists) >= start + count)
         return [targets for _, targets, _ in self.heard.lists[start:start + count]]
-
-    def lose(self):
-        """Poll until a radar is said to be lost, and return the reason."""
-        start = len(self.heard.lost)
-        self.until(lambda: len(self.heard.lost) > start)
-        return self.heard.lost[start][1]
 
 
 class Truth:

@@ -14,6 +14,7 @@ from types import SimpleNamespace
 import can
 import numpy as np
 import pytest
+from bus_master import BusMaster, BusRecorder, wait_until
 
 from driver_common import can_link, sample_clock, simulated_bus
 from driver_common.device_thread import DeviceThread
@@ -44,7 +45,6 @@ from icotronic_driver.simulator import SimulatedIcotronic, simulated_network
 from icotronic_driver.streaming import STANDARD_GRAVITY
 from icotronic_driver.values import AdcConfiguration, NetworkState
 
-DEADLINE = 15.0  # s; far more than anything takes, also on a busy machine
 RATE = 38.4e6 / (3 * 21 * 64)  # values/s after a reset
 RAW_TOLERANCE = 20  # ADC steps of 3 mg; times since the epoch are rounded to 0.2 µs
 
@@ -73,29 +73,13 @@ class Stream:
         return np.array(numbers), np.array(stamps), np.array(rows)
 
 
-class Recorder(Listener):
+class Recorder(BusRecorder, Listener):
     """Remembers what the bus tells."""
 
     def __init__(self):
-        self.found = []
-        self.lost = []
-        self.notes = []
-        self.warnings = []
+        super().__init__()
         self.streams = []
         self.readings = {}
-        self.values = []
-
-    def on_found(self, sensor):
-        self.found.append(sensor.identity)
-
-    def on_values(self, sensor):
-        self.values.append(dict(sensor.values))
-
-    def on_lost(self, sensor, error):
-        self.lost.append(error)
-
-    def on_note(self, sensor, text, *, warning=False):
-        (self.warnings if warning else self.notes).append(text)
 
     def on_stream(self, sensor):
         self.streams.append(Stream(sensor))
@@ -105,35 +89,20 @@ class Recorder(Listener):
         self.readings.setdefault(name, []).append(getattr(sensor.readings, name))
 
 
-class Host:
+class Host(BusMaster):
     """A bus that the test polls."""
 
     def __init__(self, server, **options):
-        self.heard = Recorder()
-        self.bus = make_bus(server, self.heard, **options)
-        self.sensor = self.bus.sensor
+        heard = Recorder()
+        super().__init__(make_bus(server, heard, **options), heard)
+        self.sensor = self.device
         self.bus.open()
-
-    def until(self, condition):
-        """Poll until the condition holds."""
-        deadline = time.monotonic() + DEADLINE
-        while not condition():
-            assert time.monotonic() < deadline, (
-                f"not within {DEADLINE} s; lost: {self.heard.lost}, notes: {self.heard.notes}, "
-                f"warnings: {self.heard.warnings}, {self.sensor.statistics}")
-            time.sleep(min(self.bus.poll(), 0.02))
 
     def find(self):
         """Poll until the sensor is found once more."""
         before = len(self.heard.found)
         self.until(lambda: len(self.heard.found) > before)
         return self
-
-    def lose(self):
-        """Poll until the sensor is said to be lost once more, and return the reason."""
-        before = len(self.heard.lost)
-        self.until(lambda: len(self.heard.lost) > before)
-        return self.heard.lost[before]
 
     def stream(self, frames=30):
         """Start the stream, and poll until that many more frames have come."""
@@ -481,7 +450,7 @@ def test_after_a_reset_the_sensor_comes_back_without_further_ado(connect, node, 
     host.find()
     host.more()
     if node == STH_1:
-        assert [str(error) for error in host.heard.lost] == ["reset, as asked for"]
+        assert [str(error) for _, error in host.heard.lost] == ["reset, as asked for"]
 
 
 def test_without_a_sensor_each_action_says_why(start, listen):
@@ -527,13 +496,6 @@ class Service:
         self.thread.post(lambda: self.bus.set_active(True))
         wait_until(lambda: len(self.heard.streams) > before
                    and len(self.heard.streams[-1].frames) >= frames)
-
-
-def wait_until(condition):
-    deadline = time.monotonic() + DEADLINE
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.005)
 
 
 @pytest.fixture

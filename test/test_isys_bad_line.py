@@ -5,12 +5,11 @@ from __future__ import annotations
 import dataclasses
 import math
 import random
-import time
 
 import numpy as np
 import pytest
+from bus_master import wait_until
 from isys_master import (
-    DEADLINE,
     Lab,
     Master,
     Recorder,
@@ -46,13 +45,6 @@ def start(lab):
 @pytest.fixture
 def connect(lab):
     return lab.connect
-
-
-def wait_until(condition):
-    deadline = time.monotonic() + DEADLINE
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.005)
 
 
 # --- interruptions -----------------------------------------------------------------------------

@@ -370,6 +370,14 @@ def test_diagnostics_of_a_sensor_that_is_silent(simulated, uc4000, heard, ros):
     ros.wait_for_status("uc4000: right", lambda status: status.level != ERROR)
 
 
+def test_one_sensor_can_be_stopped_and_started(simulated, uc4000, heard, ros):
+    assert uc4000.trigger("right/stop_acquisition").success
+    ros.wait_for_status("uc4000: right", lambda status: "stopped" in status.message)
+    heard.next("left/range")
+    assert uc4000.trigger("right/start_acquisition").success
+    heard.next("right/range")
+
+
 # --- life --------------------------------------------------------------------------------------
 
 def test_deactivated_cleaned_up_and_back(simulated, uc4000, heard, ros):

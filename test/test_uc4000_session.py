@@ -15,6 +15,7 @@ import time
 
 import pytest
 import serial
+from bus_master import BusMaster, BusRecorder, wait_until
 
 from driver_common.device_thread import DeviceThread
 from driver_common.errors import (
@@ -40,34 +41,18 @@ from uc4000_driver.simulator import (
 )
 from uc4000_driver.telegram import ErrorCode, Request
 
-DEADLINE = 20.0  # s; far more than anything takes, also on a busy machine
 STEP = 0.016  # m
 TRANSMISSION = (ErrorCode.CHECKSUM_ERROR, ErrorCode.TELEGRAM_TIMEOUT, ErrorCode.TELEGRAM_UNDERFLOW,
                 ErrorCode.TELEGRAM_OVERFLOW, ErrorCode.TRANSMISSION_ERROR)
 
 
-class Recorder(Listener):
+class Recorder(BusRecorder, Listener):
     """Remembers what the bus tells."""
 
     def __init__(self):
-        self.found = []
-        self.lost = []
-        self.notes = []
-        self.values = []
+        super().__init__()
         self.measurements = []
         self.temperatures = []
-
-    def on_found(self, sensor):
-        self.found.append(sensor.options.name)
-
-    def on_values(self, sensor):
-        self.values.append(dict(sensor.values))
-
-    def on_lost(self, sensor, error):
-        self.lost.append((sensor.options.name, error))
-
-    def on_note(self, sensor, text, *, warning=False):
-        self.notes.append(text)
 
     def on_measurement(self, sensor, measurement):
         self.measurements.append((sensor.options.name, measurement))
@@ -76,28 +61,15 @@ class Recorder(Listener):
         self.temperatures.append((sensor.options.name, celsius, stamp))
 
 
-class Master:
+class Master(BusMaster):
     """A bus that the test polls."""
 
     def __init__(self, port, *options, active=True, **more):
-        self.heard = Recorder()
-        self.bus = Uc4000Bus(port, options or [Options(address=7)], self.heard, **more)
-        self.sensor = self.bus.devices[0]
+        heard = Recorder()
+        super().__init__(Uc4000Bus(port, options or [Options(address=7)], heard, **more), heard)
+        self.sensor = self.device
         self.bus.set_active(active)
         self.bus.open()
-
-    def until(self, condition):
-        """Poll until the condition holds."""
-        deadline = time.monotonic() + DEADLINE
-        while not condition():
-            assert time.monotonic() < deadline, (
-                f"not within {DEADLINE} s; lost: {self.heard.lost}, notes: {self.heard.notes}")
-            time.sleep(min(self.bus.poll(), 0.02))
-
-    def find(self):
-        """Poll until every sensor is found."""
-        self.until(lambda: all(sensor.identity for sensor in self.bus.devices))
-        return self
 
     def measure(self, count=1, name=None):
         """Poll until that many new measurements have come, of one sensor or of any."""
@@ -110,12 +82,6 @@ class Master:
 
     def distances(self, count=1, name=None):
         return [measurement.distance.value for measurement in self.measure(count, name)]
-
-    def lose(self):
-        """Poll until a sensor is said to be lost, and return the reason."""
-        start = len(self.heard.lost)
-        self.until(lambda: len(self.heard.lost) > start)
-        return self.heard.lost[start][1]
 
     def note(self, text):
         """Poll until a note contains the text."""
@@ -340,6 +306,21 @@ def test_an_inactive_bus_only_looks_whether_the_sensors_are_there(connect, monke
     simulated.silent = True
     assert isinstance(master.lose(), NoAnswerError)
     assert len(simulated.measurements) == measured
+
+
+@pytest.mark.parametrize("groups", [[], ["left right"]])
+def test_one_sensor_can_be_stopped_and_started(connect, groups):
+    line, simulated = connect(1, 2)
+    master = connect.master(line, Options("left", address=1), Options("right", address=2),
+                            groups=groups).find()
+    right = master.bus.devices[1]
+    master.measure(2, "right")
+    master.bus.set_enabled(right, False)
+    before = len(simulated[1].measurements)
+    master.measure(5, "left")
+    assert len(simulated[1].measurements) == before
+    master.bus.set_enabled(right, True)
+    master.measure(2, "right")
 
 
 # --- temperature -------------------------------------------------------------------------------
@@ -1027,23 +1008,16 @@ def test_unplugged_and_plugged_in_again(connect, tmp_path):
     thread = DeviceThread("bus", bus, states.append)
     thread.start()
     thread.call(lambda: bus.set_active(True))
-    wait(lambda: master.measurements)
+    wait_until(lambda: master.measurements)
     line.close()
-    wait(lambda: isinstance(states[-1], LinkError))
+    wait_until(lambda: isinstance(states[-1], LinkError))
     with pytest.raises(NoAnswerError, match="is not connected: "):
         thread.call(lambda: bus.write(bus.devices[0], {"gain_db": 60.0}))
     connect(link=link)
     before = len(master.measurements)
-    wait(lambda: len(master.measurements) > before)
+    wait_until(lambda: len(master.measurements) > before)
     assert states[-1] is None
     thread.stop()
-
-
-def wait(condition):
-    deadline = time.monotonic() + DEADLINE
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
 
 
 def test_a_long_measurement_does_not_delay_the_end(connect):
@@ -1053,7 +1027,7 @@ def test_a_long_measurement_does_not_delay_the_end(connect):
     thread = DeviceThread("bus", bus, lambda error: None)
     thread.start()
     thread.call(lambda: bus.set_active(True))
-    wait(lambda: simulated.measurements)
+    wait_until(lambda: simulated.measurements)
     begin = time.monotonic()
     thread.stop()
     assert time.monotonic() - begin < 5.0  # the measurement takes 12.75 s

@@ -304,7 +304,8 @@ class Uc4000Bus(DeviceBus[Sensor]):
             return [sensor]
         others = [other for other in self.devices
                   if other is not sensor and other.options.name in group.names
-                  and other.identity and not other.misses and not other.error
+                  and other.is_connected and not other.misses and not other.error
+                  and self.wants(other)
                   and other.due <= now and not other.wants_temperature
                   and other.options.cycles == sensor.options.cycles]
         others.sort(key=lambda other: other.served)
