@@ -117,21 +117,6 @@ def start():
         server.close()
 
 
-@pytest.fixture
-def launch():
-    """Start nodes with parameters and ROS arguments; those that still run are killed."""
-    processes = []
-
-    def launch_one(parameters=None, *arguments):
-        processes.append(NodeProcess(MODULE, parameters, *arguments))
-        return processes[-1]
-
-    yield launch_one
-    for process in processes:
-        process.__exit__()
-        print(process.log)  # for the report of a test that failed
-
-
 # --- a node that runs through many tests -------------------------------------------------------
 
 class Station:

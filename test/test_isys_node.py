@@ -53,20 +53,6 @@ def lab():
 
 
 @pytest.fixture
-def launch():
-    """Start nodes with parameters and ROS arguments; those that still run are killed."""
-    processes = []
-
-    def launch_one(parameters=None, *arguments):
-        processes.append(NodeProcess(MODULE, parameters, *arguments))
-        return processes[-1]
-
-    yield launch_one
-    for process in processes:
-        process.__exit__()
-
-
-@pytest.fixture
 def station(ros, lab, launch):
     """Start a radar and a node that has found it."""
     def start(model="iSYS-4001", parameters=None, *arguments):
