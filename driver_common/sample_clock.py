@@ -1,29 +1,54 @@
-"""When a sample was taken, on the host's clock, from its place in the stream.
+"""When a sample was taken, on the host's clocks, from its place in the stream.
 
 A sensor samples at a steady pace; its frames arrive late, by a changing amount, but never early.
 So the earliest arrivals show the sensor's clock: the line with their slope that none of them lies
 before gives each sample its time, and no sample a time in the future. The line is fitted again
 once per window, which follows the drift between both clocks.
+
+That is done on the monotonic clock, which nobody sets; `HostClock` turns it into the time of day.
 """
 
 from __future__ import annotations
 
+import time
 from collections import deque
 
 WINDOW = 1.0  # s of samples that give one earliest arrival
 WINDOWS = 30  # earliest arrivals that the line goes through
 MAX_DEVIATION = 0.02  # of the nominal rate; beyond it an estimate is no clock
-RESTART = 0.5e9  # ns that a frame is too early: another stream, or a clock that was set
+RESTART = 0.5e9  # ns that a frame is too early: another stream
 BACKLOG = 10e9  # ns that frames can wait for a host that was busy; beyond it, the same
-LATE = 50e6  # ns of delay in a whole window: they waited, or the clock was set forward
-LATE_WINDOWS = 3  # after so many of them it was the clock
+LATE = 50e6  # ns of delay in a whole window: they waited, or the sensor paused unnoticed
+LATE_WINDOWS = 3  # after so many of them it was the sensor
+SET = 1_000_000  # ns by which the time of day jumps when somebody sets it
+UNDISTURBED = 50_000  # ns in which both clocks of the host are read, if nothing comes in between
+SMOOTHING = 16  # measurements over which slow corrections of the time of day are spread
+
+
+class HostClock:
+    """The host's time of day against its monotonic clock.
+
+    Attributes:
+        offset: What to add to monotonic ns, for ns since the epoch.
+    """
+
+    def __init__(self) -> None:
+        """Read both clocks."""
+        self.offset = time.time_ns() - time.monotonic_ns()
+
+    def follow(self) -> None:
+        """Read both clocks again: a jump counts at once, a slow correction smoothly."""
+        before, wall, after = time.monotonic_ns(), time.time_ns(), time.monotonic_ns()
+        if after - before <= UNDISTURBED:
+            difference = wall - (before + after) // 2 - self.offset
+            self.offset += difference if abs(difference) > SET else difference // SMOOTHING
 
 
 class SampleClock:
-    """Maps sample numbers to host times in ns: `base + origin + number * period`.
+    """Maps sample numbers to monotonic times in ns: `base + origin + number * period`.
 
     Attributes:
-        base: Host time in ns near the beginning, so that `origin` keeps its precision.
+        base: Time in ns near the beginning, so that `origin` keeps its precision.
         origin: Time of sample 0 in ns after `base`.
         period: Time between two samples in ns.
     """
@@ -50,7 +75,7 @@ class SampleClock:
 
         Args:
             number: Number of the frame's last sample.
-            arrival: Host time in ns when the frame was there.
+            arrival: Monotonic time in ns when the frame was there.
         """
         arrival -= self.base
         delay = arrival - (self.origin + number * self.period)
@@ -71,7 +96,7 @@ class SampleClock:
             self._least_delay = 0.0
 
     def time_of(self, number: int) -> int:
-        """Return the host time in ns at which a sample was taken."""
+        """Return the monotonic time in ns at which a sample was taken."""
         return self.base + int(self.origin + number * self.period)
 
     @property

@@ -51,7 +51,7 @@ class Line:
     Attributes:
         counts: What was counted.
         on_stream: Takes the data of each frame of the acceleration stream, when it was on the bus
-            in s of the interface's clock, and its arrival in ns of host time.
+            in s of the interface's clock, and its arrival in monotonic ns.
     """
 
     def __init__(self, interface: str, channel: str, bitrate: int, options: Sequence[str]) -> None:
@@ -94,7 +94,7 @@ class Line:
         link, handle = self.link, self.on_stream
         receive, monotonic = link.receive, time.monotonic_ns
         now = monotonic()
-        end, host_time = now + int(duration * 1e9), time.time_ns() - now
+        end = now + int(duration * 1e9)
         try:
             while now < end:
                 message = receive((end - now) * 1e-9)
@@ -102,7 +102,7 @@ class Line:
                     return
                 now = monotonic()
                 if message.arbitration_id == STREAM_ID and handle and message.is_extended_id:
-                    handle(message.data, message.timestamp, now + host_time)
+                    handle(message.data, message.timestamp, now)
                 else:
                     self._count(message)
         except (can.CanError, OSError) as error:
@@ -134,7 +134,7 @@ class Line:
                     break
                 streamed = message.arbitration_id == STREAM_ID and message.is_extended_id
                 if streamed and self.on_stream:
-                    self.on_stream(message.data, message.timestamp, time.time_ns())
+                    self.on_stream(message.data, message.timestamp, time.monotonic_ns())
                 if (message.is_extended_id and not message.is_error_frame
                         and request.is_answered_by(message.arbitration_id, message.data)):
                     return request.result(message.arbitration_id, message.data)

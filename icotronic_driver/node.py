@@ -38,6 +38,7 @@ STREAM_OPTIONS = ("channels", *(f"axis.{axis}" for axis in AXES), "sample_rate",
                   "calibration_source", "acceleration_range_g", "linear_acceleration_stddev",
                   "time_offset")
 RECEIVERS = {"sth": STH_1, "stu": STU_1}
+CLOCK_WAS_SET = 500_000_000  # ns by which stamps go back only if the host's clock does
 LOSS_LIMIT = 0.01  # share of the frames that may be lost without a warning
 QUEUE_TIME = 0.2  # s of samples that a publisher keeps for slow subscribers
 QUEUE_DEPTH = 2000  # enough for QUEUE_TIME at the default rate
@@ -330,7 +331,9 @@ def _publisher(serialise: Callable[[int, float, float, float], bytes],
 
     def publish_samples(stamp: int, period: float, values: tuple[int, ...]) -> None:
         nonlocal last
-        stamp = max(stamp + stamp_offset, last + 1)  # stamps never go backwards
+        stamp += stamp_offset
+        if last - CLOCK_WAS_SET < stamp <= last:
+            stamp = last + 1  # an estimate that became better does not go backwards
         step = int(period)
         for first in range(0, len(values), channels):
             publish(serialise(stamp, x_slope * values[first + x] + x_offset,

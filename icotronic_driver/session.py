@@ -24,7 +24,7 @@ from driver_common.errors import (
     SettingError,
     WrongDeviceError,
 )
-from driver_common.sample_clock import SampleClock
+from driver_common.sample_clock import HostClock, SampleClock
 from driver_common.settings import Raw, Record, Value
 from icotronic_driver import commands, eeprom
 from icotronic_driver.commands import SELF, IcotronicRecord, decode_name
@@ -85,6 +85,7 @@ class IcotronicBus(DeviceBus[Sensor]):
         self._settled_since = 0.0
         self._searching_since = 0.0
         self._last_frame = 0.0
+        self._host_clock = HostClock()
         self._told_rate = ""
         self._next_reading = 0.0
         self._readings = itertools.cycle(_READINGS)
@@ -383,6 +384,7 @@ class IcotronicBus(DeviceBus[Sensor]):
             self._start_or_stop(sensor)  # it did not work when it was asked for
         if sensor.decoder is not None:
             frames = sensor.decoder.statistics.frames
+            self._host_clock.follow()
             self.line.listen(LISTEN_TIME)
             if sensor.decoder.statistics.frames != frames:
                 self._last_frame = time.monotonic()
@@ -417,7 +419,7 @@ class IcotronicBus(DeviceBus[Sensor]):
 
     def _stream_handler(self, sensor: Sensor) -> StreamHandler:
         """Return what is done with each frame of the stream: the hot path."""
-        decoder, clock = sensor.decoder, sensor.clock
+        decoder, clock, host_clock = sensor.decoder, sensor.clock, self._host_clock
         assert decoder is not None
         decode, data_sets, update = decoder.decode_frame, decoder.format.data_sets, clock.update
         publish = self._listener.on_stream(sensor)
@@ -430,7 +432,7 @@ class IcotronicBus(DeviceBus[Sensor]):
                 return
             number = decoder.number * data_sets
             update(number + data_sets - 1, now)
-            publish(clock.time_of(number), clock.period, values)
+            publish(clock.time_of(number) + host_clock.offset, clock.period, values)
             if decoder.statistics.lost != lost:
                 if not lost:
                     self._note(f"{decoder.statistics.lost} frames were lost on the "

@@ -24,7 +24,7 @@ from driver_common.simulated_bus import CanFrame
 from icotronic_driver import commands
 from icotronic_driver.identifier import STU_1
 from icotronic_driver.line import STREAM_ID
-from icotronic_driver.node import IcotronicNode
+from icotronic_driver.node import IcotronicNode, _Place, _publisher
 from icotronic_driver.settings import SETTINGS
 from icotronic_driver.simulator import SimulatedIcotronic, simulated_network
 from icotronic_driver.streaming import STANDARD_GRAVITY
@@ -115,6 +115,19 @@ def start():
     yield start_one
     for server in servers:
         server.close()
+
+
+# --- stamps ------------------------------------------------------------------------------------
+
+@pytest.mark.parametrize(("second", "published"), [
+    (3_100, [3_100, 3_200]), (1_500, [2_101, 2_201]), (-10**9, [-10**9, -10**9 + 100])])
+def test_stamps_go_back_only_if_the_clock_was_set(second, published):
+    stamps = []
+    publish = _publisher(lambda stamp, x, y, z: stamp, stamps.append,
+                         [_Place(0, 1.0, 0.0)] * 3, 1, 0)
+    publish(2_000, 100.0, (1, 2))
+    publish(second, 100.0, (3, 4))
+    assert stamps == [2_000, 2_100, *published]
 
 
 # --- a node that runs through many tests -------------------------------------------------------

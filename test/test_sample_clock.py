@@ -1,10 +1,12 @@
 """The clock of a stream: from sample numbers to host times."""
 
+import itertools
 import random
+import time
 
 import pytest
 
-from driver_common.sample_clock import SampleClock
+from driver_common.sample_clock import HostClock, SampleClock
 
 RATE = 9523.8
 START = 1_800_000_000_000_000_000  # ns
@@ -72,7 +74,7 @@ def test_a_lost_second_shifts_nothing():
     assert clock.time_of(number) == pytest.approx(true, abs=1000)
 
 
-def test_a_clock_that_was_set_starts_anew():
+def test_a_sensor_that_paused_for_long_starts_anew():
     clock = SampleClock(RATE)
     list(stream(clock, 3, lambda n: 0))
     later = START + 3600 * 10**9
@@ -87,7 +89,7 @@ def test_what_waited_for_a_busy_host_keeps_its_time():
     assert max(map(abs, off)) < 1_000_000
 
 
-def test_a_clock_that_was_set_by_some_seconds_is_followed():
+def test_a_sensor_that_paused_for_some_seconds_is_followed():
     clock = SampleClock(RATE)
     list(stream(clock, 3, lambda n: 0))
     later = START + 3 * 10**9 + 5 * 10**9
@@ -99,3 +101,45 @@ def test_a_late_first_frame_is_corrected_by_the_first_early_one():
     clock = SampleClock(RATE)
     off = errors(stream(clock, 1, lambda n: 50e6 if n < 300 else 0), after=0.1)
     assert max(map(abs, off)) < 1000
+
+
+class Clocks:
+    """The clocks of a host that can be set."""
+
+    def __init__(self, monkeypatch):
+        self.monotonic, self.ahead, self.reading_takes = 10**12, START, 1000
+        monkeypatch.setattr(time, "monotonic_ns", self._monotonic)
+        monkeypatch.setattr(time, "time_ns", lambda: self.monotonic + self.ahead)
+
+    def _monotonic(self):
+        self.monotonic += self.reading_takes
+        return self.monotonic
+
+
+@pytest.mark.parametrize("jump", [-3600 * 10**9, -2 * 10**6, 2 * 10**6, 300 * 10**6])
+def test_a_time_of_day_that_was_set_counts_at_once(monkeypatch, jump):
+    clocks = Clocks(monkeypatch)
+    clock = HostClock()
+    clocks.ahead += jump
+    clock.follow()
+    assert clock.offset == pytest.approx(clocks.ahead, abs=2000)
+
+
+def test_a_slow_correction_of_the_time_of_day_is_followed_smoothly(monkeypatch):
+    clocks = Clocks(monkeypatch)
+    clock = HostClock()
+    offsets = []
+    for _ in range(400):
+        clocks.ahead += 25_000  # 500 ppm in 50 ms
+        clock.follow()
+        offsets.append(clock.offset)
+    assert max(after - before for before, after in itertools.pairwise(offsets)) < 26_000
+    assert clock.offset == pytest.approx(clocks.ahead, abs=500_000)
+
+
+def test_a_reading_that_was_interrupted_does_not_count(monkeypatch):
+    clocks = Clocks(monkeypatch)
+    clock = HostClock()
+    before, clocks.reading_takes = clock.offset, 10**6
+    clock.follow()
+    assert clock.offset == before
