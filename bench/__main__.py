@@ -31,9 +31,10 @@ def main(args: Sequence[str] | None = None) -> int:
             parser.error(f"cannot write {options.json}: {error.strerror}")
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that no process is left behind
+    failures: list[Failure] = []
     try:
-        rows = list(_measure(options.quick))
-    except Failure as failure:
+        rows = list(_measure(options.quick, failures))
+    except Failure as failure:  # of the subscriber, which most steps need
         print(f"error: {failure}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
@@ -42,10 +43,11 @@ def main(args: Sequence[str] | None = None) -> int:
         options.json.write_text(json.dumps([asdict(row) for row in rows], indent=2,
                                            ensure_ascii=False) + "\n")
     print(table(rows))
-    return 0
+    return 1 if failures else 0
 
 
-def _measure(quick: bool) -> Iterator[Row]:
+def _measure(quick: bool, failures: list[Failure]) -> Iterator[Row]:
+    """Yield what could be measured; a failure ends only the step in which it happens."""
     core = divide_cores()
     with imu.make_subscriber(core) as subscriber:
         steps: dict[str, Callable[[], list[Row]]]
@@ -60,7 +62,11 @@ def _measure(quick: bool) -> Iterator[Row]:
                          imu.find_highest_rate(subscriber, MULTIPLES, 4.0)]}
         for number, (what, measure) in enumerate(steps.items(), 1):
             print(f"{number} of {len(steps)}: measuring {what} …", file=sys.stderr, flush=True)
-            yield from measure()
+            try:
+                yield from measure()
+            except Failure as failure:
+                print(f"error: {failure}", file=sys.stderr)
+                failures.append(failure)
 
 
 def table(rows: Sequence[Row]) -> str:
