@@ -20,9 +20,6 @@ RESTART = 0.5e9  # ns that a frame is too early: another stream
 BACKLOG = 10e9  # ns that frames can wait for a host that was busy; beyond it, the same
 LATE = 50e6  # ns of delay in a whole window: they waited, or the sensor paused unnoticed
 LATE_WINDOWS = 3  # after so many of them it was the sensor
-SET = 1_000_000  # ns by which the time of day jumps when somebody sets it
-UNDISTURBED = 50_000  # ns in which both clocks of the host are read, if nothing comes in between
-SMOOTHING = 16  # measurements over which slow corrections of the time of day are spread
 
 
 class HostClock:
@@ -34,14 +31,12 @@ class HostClock:
 
     def __init__(self) -> None:
         """Read both clocks."""
-        self.offset = time.time_ns() - time.monotonic_ns()
+        self.follow()
 
     def follow(self) -> None:
-        """Read both clocks again: a jump counts at once, a slow correction smoothly."""
-        before, wall, after = time.monotonic_ns(), time.time_ns(), time.monotonic_ns()
-        if after - before <= UNDISTURBED:
-            difference = wall - (before + after) // 2 - self.offset
-            self.offset += difference if abs(difference) > SET else difference // SMOOTHING
+        """Read both clocks, because somebody may have set or corrected the time of day."""
+        # The largest of some differences: whatever comes between two readings makes them smaller.
+        self.offset = max(time.time_ns() - time.monotonic_ns() for _ in range(3))
 
 
 class SampleClock:

@@ -1,6 +1,5 @@
 """The clock of a stream: from sample numbers to host times."""
 
-import itertools
 import random
 import time
 
@@ -107,39 +106,26 @@ class Clocks:
     """The clocks of a host that can be set."""
 
     def __init__(self, monkeypatch):
-        self.monotonic, self.ahead, self.reading_takes = 10**12, START, 1000
-        monkeypatch.setattr(time, "monotonic_ns", self._monotonic)
-        monkeypatch.setattr(time, "time_ns", lambda: self.monotonic + self.ahead)
+        self.now, self.ahead, self.interruptions = 10**12, START, []
+        monkeypatch.setattr(time, "monotonic_ns", lambda: self.now)
+        monkeypatch.setattr(time, "time_ns", self._time_ns)
 
-    def _monotonic(self):
-        self.monotonic += self.reading_takes
-        return self.monotonic
+    def _time_ns(self):
+        result = self.now + self.ahead
+        self.now += self.interruptions.pop() if self.interruptions else 100
+        return result
 
 
-@pytest.mark.parametrize("jump", [-3600 * 10**9, -2 * 10**6, 2 * 10**6, 300 * 10**6])
-def test_a_time_of_day_that_was_set_counts_at_once(monkeypatch, jump):
+@pytest.mark.parametrize("change", [-3600 * 10**9, -25_000, 25_000, 300 * 10**6])
+def test_a_time_of_day_that_was_set_or_corrected_counts_at_once(monkeypatch, change):
     clocks = Clocks(monkeypatch)
     clock = HostClock()
-    clocks.ahead += jump
+    clocks.ahead += change
     clock.follow()
-    assert clock.offset == pytest.approx(clocks.ahead, abs=2000)
+    assert clocks.ahead - 200 < clock.offset <= clocks.ahead  # so no stamp lies in the future
 
 
-def test_a_slow_correction_of_the_time_of_day_is_followed_smoothly(monkeypatch):
+def test_what_comes_between_two_readings_does_not_count(monkeypatch):
     clocks = Clocks(monkeypatch)
-    clock = HostClock()
-    offsets = []
-    for _ in range(400):
-        clocks.ahead += 25_000  # 500 ppm in 50 ms
-        clock.follow()
-        offsets.append(clock.offset)
-    assert max(after - before for before, after in itertools.pairwise(offsets)) < 26_000
-    assert clock.offset == pytest.approx(clocks.ahead, abs=500_000)
-
-
-def test_a_reading_that_was_interrupted_does_not_count(monkeypatch):
-    clocks = Clocks(monkeypatch)
-    clock = HostClock()
-    before, clocks.reading_takes = clock.offset, 10**6
-    clock.follow()
-    assert clock.offset == before
+    clocks.interruptions = [10**9, 50, 10**6]
+    assert HostClock().offset == clocks.ahead - 50
