@@ -332,14 +332,15 @@ def _publisher(serialise: Callable[[int, float, float, float], bytes],
     def publish_samples(stamp: int, period: float, values: tuple[int, ...]) -> None:
         nonlocal last
         stamp += stamp_offset
-        if last - CLOCK_WAS_SET < stamp <= last:
-            stamp = last + 1  # an estimate that became better does not go backwards
+        if stamp < last - CLOCK_WAS_SET:
+            last = stamp - 1
         step = int(period)
         for first in range(0, len(values), channels):
-            publish(serialise(stamp, x_slope * values[first + x] + x_offset,
+            # A better estimate of the sensor's clock may lie before what was published.
+            last = stamp if stamp > last else last + 1
+            publish(serialise(last, x_slope * values[first + x] + x_offset,
                               y_slope * values[first + y] + y_offset,
                               z_slope * values[first + z] + z_offset))
-            last = stamp
             stamp += step
 
     return publish_samples

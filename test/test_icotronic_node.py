@@ -120,7 +120,8 @@ def start():
 # --- stamps ------------------------------------------------------------------------------------
 
 @pytest.mark.parametrize(("second", "published"), [
-    (3_100, [3_100, 3_200]), (1_500, [2_101, 2_201]), (-10**9, [-10**9, -10**9 + 100])])
+    (3_100, [3_100, 3_200]), (2_050, [2_101, 2_150]), (1_500, [2_101, 2_102]),
+    (-10**9, [-10**9, -10**9 + 100])])
 def test_stamps_go_back_only_if_the_clock_was_set(second, published):
     stamps = []
     publish = _publisher(lambda stamp, x, y, z: stamp, stamps.append,
