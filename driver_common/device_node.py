@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any, Protocol
@@ -12,6 +13,7 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticStatus
 from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import SetParametersResult
+from rclpy.clock import Clock, ClockType
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter as RosParameter
@@ -74,11 +76,14 @@ class DeviceNode(LifecycleNode):
         self.thread: DeviceThread | None = None
         self.simulator: Simulator | None = None
         self._bus_error: DriverError | None = None
+        self._statuses: list[DiagnosticStatus] = []
+        self._statuses_due = 0.0
         self._diagnostics = diagnostics.Diagnostics(self)
         self._devices: dict[str, Any] = {}
         self._entities: list[Callable[[], object]] = []
         self._declare_options()
-        self.create_timer(diagnostics.PERIOD, self._publish_diagnostics)
+        self.create_timer(diagnostics.PERIOD, self._publish_diagnostics,
+                          clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._refuse_impossible_transitions()
 
     # --- what a driver provides ---
@@ -331,6 +336,7 @@ class DeviceNode(LifecycleNode):
 
     def on_found(self, device: Any) -> None:
         """Show the device's settings as parameters."""
+        self._note_link_works()
         self.get_logger().info(f"{device.title}: connected to {self.describe(device)}")
         self.show_settings(device.options.name, device)
 
@@ -340,6 +346,7 @@ class DeviceNode(LifecycleNode):
 
     def on_lost(self, device: Any, error: DriverError) -> None:
         """Log why there is no device."""
+        self._note_link_works()
         self.get_logger().error(f"{device.title}: {error} (waiting for it)")
 
     def on_note(self, device: Any, text: str, *, warning: bool = False) -> None:
@@ -353,11 +360,17 @@ class DeviceNode(LifecycleNode):
         """Take note that the link opened or failed; one line in the log per change."""
         if not self.context.ok():
             return
-        if error is not None and str(error) != str(self._bus_error):
+        if error is None:
+            self._note_link_works()
+            return
+        if str(error) != str(self._bus_error):
             self.get_logger().error(f"{error} (waiting for it)")
-        elif error is None and self._bus_error is not None:
-            self.get_logger().info("the link is open again")
         self._bus_error = error
+
+    def _note_link_works(self) -> None:
+        if self._bus_error is not None:
+            self.get_logger().info("the link is open again")
+        self._bus_error = None
 
     # --- interfaces ---
 
@@ -409,6 +422,26 @@ class DeviceNode(LifecycleNode):
         service = self.create_service(Trigger, self.topic(sensor, name), handle)
         self._entities.append(lambda: self.destroy_service(service))
 
+    # --- diagnostics ---
+
+    def _note_statuses(self, pause: float) -> None:
+        """Keep what the diagnostics say; in the thread of the bus, so nothing changes meanwhile.
+
+        Args:
+            pause: Time in s until there is anything new.
+        """
+        now = time.monotonic()
+        if now + pause < self._statuses_due:
+            return
+        self._statuses_due = now + diagnostics.PERIOD / 4
+        try:
+            self._statuses = [self.status_of(device) for device in self.bus.devices]
+        except Exception as error:  # it must not disturb the bus
+            text = f"internal error, please report it: {error!r}"
+            self.get_logger().error(text, throttle_duration_sec=60.0)
+            self._statuses = [diagnostics.to_status(
+                self.get_name(), "", diagnostics.ERROR, text, {})]
+
     def _publish_diagnostics(self) -> None:
         if self.bus is None:
             statuses: Iterable[DiagnosticStatus] = [diagnostics.to_status(
@@ -417,7 +450,7 @@ class DeviceNode(LifecycleNode):
             statuses = [diagnostics.to_status(
                 self.get_name(), "", diagnostics.ERROR, str(self._bus_error), {})]
         else:
-            statuses = [self.status_of(device) for device in self.bus.devices]
+            statuses = self._statuses
         self._diagnostics.publish(statuses)
 
     # --- lifecycle ---
@@ -448,7 +481,9 @@ class DeviceNode(LifecycleNode):
             self._close()
             return TransitionCallbackReturn.FAILURE
         self.bus = bus
-        self.thread = DeviceThread(f"{self.get_name()} bus", bus, self.on_bus_state)
+        self._note_statuses(0.0)
+        self.thread = DeviceThread(f"{self.get_name()} bus", bus, self.on_bus_state,
+                                   self._note_statuses)
         self.thread.start()
         return super().on_configure(state)
 
@@ -489,6 +524,7 @@ class DeviceNode(LifecycleNode):
         self.thread = None
         self.bus = None
         self._bus_error = None
+        self._statuses_due = 0.0
         self.store.undeclare(self._devices)
         self._devices.clear()
         for destroy in self._entities:

@@ -69,18 +69,21 @@ class DeviceThread(threading.Thread):
     Everything that touches the bus runs here; others hand in their work with `call`.
     """
 
-    def __init__(self, name: str, bus: Bus, on_state: Callable[[DriverError | None], None]) -> None:
+    def __init__(self, name: str, bus: Bus, on_state: Callable[[DriverError | None], None],
+                 on_step: Callable[[float], None] = lambda pause: None) -> None:
         """Prepare the thread.
 
         Args:
             name: Name of the thread.
             bus: The bus to serve.
-            on_state: Called in this thread with None when the link opened, or with the error that
-                closed it or kept it closed.
+            on_state: Called in this thread with None when the link was opened and did a first
+                step, or with the error that closed it or kept it closed.
+            on_step: Called in this thread after each step, with the time in s until the next one.
         """
         super().__init__(name=name, daemon=True)
         self._bus = bus
         self._on_state = on_state
+        self._on_step = on_step
         self._jobs: queue.SimpleQueue[tuple[Callable[[], Any], Future[Any]] | None] = (
             queue.SimpleQueue())
         self._stopping = False
@@ -119,10 +122,15 @@ class DeviceThread(threading.Thread):
         while not self._stopping:
             try:
                 self._bus.open()
-                backoff.reset()
-                self._on_state(None)
+                works = False  # some links fail only when they are used
                 while not self._stopping:
-                    self._run_jobs(self._bus.poll())
+                    pause = self._bus.poll()
+                    if not works:
+                        works = True
+                        backoff.reset()
+                        self._on_state(None)
+                    self._on_step(pause)
+                    self._run_jobs(pause)
             except DriverError as error:
                 if not self._stopping:
                     self._on_state(error)

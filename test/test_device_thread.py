@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import queue
 import threading
+import time
 
 import pytest
 
@@ -72,6 +73,12 @@ def next_state(states):
     return states.get(timeout=DEADLINE)
 
 
+def opened(bus, states):
+    """Let the bus do its first step, and hear that it is open."""
+    bus.steps.put(0.0)
+    assert next_state(states) is None
+
+
 def test_pauses_double_up_to_the_longest():
     backoff = Backoff(0.1, 2.0)
     pauses = [backoff.pause() for _ in range(7)]
@@ -104,7 +111,7 @@ def test_work_does_not_wait_for_the_pause_of_the_bus(bus, start):
 
 def test_work_that_fails_fails_for_its_caller_alone(bus, start):
     thread, states = start(bus)
-    assert next_state(states) is None
+    opened(bus, states)
     for error in (RefusedError("no"), ZeroDivisionError("oh")):
         def fail(error=error):
             raise error
@@ -146,7 +153,7 @@ def test_a_bus_that_cannot_be_opened_is_tried_again(bus, start):
     bus.failures = [LinkError("not there"), LinkError("not there")]
     thread, states = start(bus)
     assert [str(next_state(states)) for _ in range(2)] == ["not there", "not there"]
-    assert next_state(states) is None
+    opened(bus, states)
     bus.steps.put(FOREVER)
     thread.call(lambda: None)
     assert bus.events[:4] == ["close", "close", "open", "poll"]
@@ -163,27 +170,47 @@ def test_work_is_done_also_while_the_bus_is_closed(bus, start):
 
 def test_after_an_error_the_bus_is_closed_and_opened_again(bus, start):
     _, states = start(bus)
-    assert next_state(states) is None
+    opened(bus, states)
     bus.steps.put(LinkError("unplugged"))
     assert str(next_state(states)) == "unplugged"
-    assert next_state(states) is None
-    assert bus.events[:4] == ["open", "poll", "close", "open"]
+    opened(bus, states)
+    assert bus.events[:5] == ["open", "poll", "poll", "close", "open"]
+
+
+def test_a_bus_that_opens_but_does_not_work_is_not_told_as_open(bus, start):
+    for _ in range(3):
+        bus.steps.put(LinkError("it is down"))
+    _, states = start(bus)
+    began = time.monotonic()
+    assert [str(next_state(states)) for _ in range(3)] == ["it is down"] * 3
+    assert time.monotonic() - began >= 0.1 + 0.2  # the pauses grow
+    opened(bus, states)
+
+
+def test_after_each_step_it_is_said_how_long_nothing_needs_to_be_done(bus):
+    pauses = queue.SimpleQueue()
+    thread = DeviceThread("bus", bus, lambda error: None, pauses.put)
+    for pause in (0.0, 0.01, FOREVER):
+        bus.steps.put(pause)
+    thread.start()
+    assert [pauses.get(timeout=DEADLINE) for _ in range(3)] == [0.0, 0.01, FOREVER]
+    thread.stop()
 
 
 def test_an_error_in_the_code_is_told_with_its_place_and_ends_nothing(bus, start):
     _, states = start(bus)
-    assert next_state(states) is None
+    opened(bus, states)
     bus.steps.put(ZeroDivisionError("oh"))
     error = next_state(states)
     assert isinstance(error, DriverError)
     assert "internal error, please report it: ZeroDivisionError: oh" in str(error)
     assert "test_device_thread.py:" in str(error)
-    assert next_state(states) is None
+    opened(bus, states)
 
 
 def test_stopping_closes_the_bus_and_ends_the_thread(bus, start):
     thread, states = start(bus)
-    assert next_state(states) is None
+    opened(bus, states)
     bus.steps.put(0.0)
     bus.steps.put(FOREVER)
     thread.stop()
@@ -204,7 +231,7 @@ def test_stopping_does_not_wait_for_a_long_pause(bus, start):
 def test_stopping_interrupts_a_step_where_the_bus_can(start):
     bus = InterruptibleBus()
     thread, states = start(bus)
-    assert next_state(states) is None
+    opened(bus, states)
     thread.stop()
     assert not thread.is_alive()
     assert states.empty()  # the interruption is no error
