@@ -12,7 +12,7 @@ import time
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
-from nodes import NodeProcess, Ros
+from nodes import NodeProcess, Process, Ros
 from rcl_interfaces.msg import ParameterType
 from sensor_msgs.msg import Range, Temperature
 
@@ -439,6 +439,15 @@ def test_an_end_within_a_long_measurement(tmp_path):
         process.stop()
         assert time.monotonic() - begin < 8.0  # the measurement takes 12.75 s
     line.close()
+
+
+def test_an_error_in_the_code_of_the_diagnostics_does_not_end_the_node(ros):
+    before = f"import {UC4000} as node; node.Uc4000Node.status_of = lambda self, sensor: 1 / 0"
+    arguments = "--ros-args", "-p", "serial_port:=sim://UC4000", "-r", "__node:=tank"
+    with Process(UC4000, *arguments, before=before):
+        status = ros.wait_for_status("tank", lambda status: "report it" in status.message)
+        assert status.message.startswith("internal error, please report it: ZeroDivisionError")
+        Heard(ros, "/tank").several("range", 3)
 
 
 @pytest.mark.parametrize(("parameters", "text"), [
