@@ -201,6 +201,7 @@ READ_RAW = Command("read the raw signals", READ_RAW_SIGNALS, _raw_signals, secti
 READ_RANGE_LIST = Command("read the range list", 0xE1, _range_list, section="3.3.11")
 
 TARGET_LIST_SECTION = "3.3.7"
+TEMPERATURE_THRESHOLDS_SECTION = "3.3.5.17"  # what "set the default temperature thresholds" sets
 
 
 def read_target_list(address: int, output: int, resolution: Resolution) -> Frame:
@@ -230,6 +231,7 @@ class IsysRecord(Record):
         function_code: FC to read; the one to write is one more.
         sub_function: Sub-function code.
         has_location: Whether request and write carry a save location.
+        stored_at_once: Whether every write goes to the EEPROM as well.
         selector: Number of the output or zone, in the bytes behind the location.
     """
 
@@ -237,6 +239,7 @@ class IsysRecord(Record):
     sub_function: int
     _: KW_ONLY
     has_location: bool = False
+    stored_at_once: bool = False
     selector: bytes = b""
 
     def _prefix(self, location: Location) -> bytes:

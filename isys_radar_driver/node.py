@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -41,6 +42,14 @@ MODEL_TOPICS = (
 PWM_STEP = 0.01  # m or m/s, table 35
 
 
+class ModelOption(Option):
+    """The name of a model, of which YAML takes one such as 4001 for a number."""
+
+    def check(self, value: object) -> Value:
+        """Return the name; raises SettingError."""
+        return super().check(str(value) if type(value) is int else value)
+
+
 class IsysRadarNode(DeviceNode, Listener):
     """Driver of one or several iSYS radars on a serial line."""
 
@@ -48,12 +57,12 @@ class IsysRadarNode(DeviceNode, Listener):
         Option("serial_port", kind=str, default="",
                description="Device path, pyserial URL such as socket://host:port, or sim://MODEL"),
         Option("serial_baud", kind=int, default=0, minimum=0, unit="Bd",
-               description="Baud rate; 0 = the model's default"),
+               description="Baud rate; 0 = the default rates of the models, one after the other"),
     )
     SENSOR_OPTIONS = (
         Option("address", kind=int, default=0, minimum=0, maximum=255,
                description="Address on the line; 0 = ask (only one sensor may be connected)"),
-        Option("model", kind=str, default="",
+        ModelOption("model", kind=str, default="",
                description="The only model that is accepted, such as iSYS-4001; empty = any"),
         Option("frame_id", kind=str, default="{sensor}_link", live=True,
                description="Frame of the measurements"),
@@ -61,7 +70,7 @@ class IsysRadarNode(DeviceNode, Listener):
                description="Output whose filter the target lists have passed"),
         Option("target_list_resolution", kind=str, choices=RESOLUTIONS, default="auto", live=True,
                description="Bits per value of the target lists; auto = the finest that fits the "
-                           "cycle at this baud rate"),
+                           "cycle at this baud rate, with all radars of the line"),
         Option("time_offset", kind=float, default=0.0, unit="s", live=True,
                description="Added to every stamp; negative where the measurement was earlier"),
         Option("positive_velocity", kind=str, default="approaching", live=True,
@@ -185,12 +194,16 @@ class IsysRadarNode(DeviceNode, Listener):
               target.signal) for target in targets.targets],
             *self._frame_and_stamp(radar, stamp)))
 
-    def on_range_list(self, radar: Radar, values: RangeList, stamp: int) -> None:
-        """Publish range and temperature."""
+    def on_range_list(self, radar: Radar, values: RangeList, targets: TargetList,
+                      stamp: int) -> None:
+        """Publish range and temperature; without a target the range list says 0 m."""
         assert radar.model is not None
         where = self._frame_and_stamp(radar, stamp)
+        distance = values.range
+        if not targets.targets:
+            distance = math.nan if targets.clipping else math.inf  # REP-117: unknown, nothing seen
         self._publish(radar, "range", to_range(
-            values.range, (0.0, radar.model.range_max), 0.0, *where))
+            distance, (0.0, radar.model.range_max), 0.0, *where))
         self._publish(radar, "temperature", to_temperature(values.temperature, *where))
         radar.temperatures["sensor"] = values.temperature
 
@@ -220,25 +233,45 @@ class IsysRadarNode(DeviceNode, Listener):
     # --- services, in the executor ---
 
     def _save(self, radar: Radar, command: Command[None]) -> str:
-        saved = self.call(lambda: self.bus.save(radar, command))
-        return "saved" + (f"; changed since the start: {', '.join(saved)}" if saved else "")
+        return str(self.call(lambda: self._saved(radar, command)))
+
+    def _saved(self, radar: Radar, command: Command[None]) -> str:
+        """Save, and return what was saved; in the thread of the bus, which owns the values."""
+        names = ", ".join(self.bus.save(radar, command))
+        assert radar.model is not None
+        nothing = "saved" if radar.model.supports(command) else "nothing to save"
+        saved = f"saved; changed before: {names}" if names else nothing
+        return saved + self._not_savable(radar, command)
 
     def _preview_save(self, radar: Radar) -> str:
-        stored = self.call(lambda: self.bus.stored_values(radar))
-        lines = [f"{name}: {radar.settings[name].text(value)} → "
-                 f"{radar.settings[name].text(radar.values[name])}"
+        return str(self.call(lambda: self._preview(radar)))
+
+    def _preview(self, radar: Radar) -> str:
+        """Return what saving all would change; in the thread of the bus."""
+        command = commands.SAVE_ALL_SETTINGS
+        stored = self.bus.stored_values(radar)
+
+        def text(name: str, value: Value) -> str:
+            return radar.settings[name].text(value)
+
+        lines = [f"{name}: {text(name, value)} → {text(name, radar.values[name])}"
                  for name, value in stored.items() if value != radar.values[name]]
-        lines += [f"{name}: now {radar.settings[name].text(radar.values[name])}"
-                  for name in sorted(radar.unsaved) if name not in stored]
-        return "saving would change " + ("; ".join(lines) if lines else "nothing that is known")
+        lines += [f"{name}: now {text(name, radar.values[name])}"
+                  for name in self.bus.unsaved(radar, command) if name not in stored]
+        return ("saving would change " + ("; ".join(lines) if lines else "nothing that is known")
+                + self._not_savable(radar, command))
+
+    def _not_savable(self, radar: Radar, command: Command[None]) -> str:
+        names = ", ".join(self.bus.unsaved(radar, command, possible=False))
+        product = radar.product
+        return f"; the {product} cannot store {names}: lost at power-off" if names else ""
 
     def _restore_factory_settings(self, radar: Radar) -> str:
         self.call(lambda: self.bus.restore_factory_settings(radar))
         return "factory settings restored, in RAM and EEPROM"
 
     def _set_default_thresholds(self, radar: Radar) -> str:
-        thresholds = self.call(
-            lambda: self.bus.execute(radar, commands.SET_DEFAULT_TEMPERATURE_THRESHOLDS))
+        thresholds = self.call(lambda: self.bus.set_default_thresholds(radar))
         return "temperature thresholds are " + ", ".join(f"{value:g} °C" for value in thresholds)
 
     def _change_address(self, radar: Radar) -> str:
@@ -270,6 +303,7 @@ class IsysRadarNode(DeviceNode, Listener):
                 "rate [Hz]": radar.rate}
         values |= {
             "target lists": counts.target_lists, "lost cycles": counts.lost_cycles,
+            "cycles left to others": counts.shared_cycles,
             "clippings": counts.clippings, "time-outs": counts.timeouts,
             "refusals": counts.refusals, "connections": radar.connections,
             "damaged frames": line.parser.damaged_frames,
@@ -290,17 +324,26 @@ class IsysRadarNode(DeviceNode, Listener):
             return diagnostics.ERROR, str(radar.error or "searching")
         if radar.misses:
             return diagnostics.WARN, "does not answer"
+        if radar.error is not None:
+            return diagnostics.WARN, str(radar.error)
         if radar.differing:
             return diagnostics.WARN, f"{len(radar.differing)} settings are not as wanted"
         if not radar.measuring:
             return diagnostics.OK, "connected, acquisition stopped"
         if not model.has_target_lists:
             return diagnostics.OK, "connected; this model sends no target lists over serial"
+        if radar.is_overloaded:
+            return diagnostics.WARN, "receiver overloaded, no targets"
+        return self._health_of_rate(radar)
+
+    def _health_of_rate(self, radar: Radar) -> tuple[bytes, str]:
         message = f"{radar.rate:.1f} target lists per second"
         expected = 1 / radar.cycle_time
-        if len(radar.arrivals) > 2 and radar.rate < 0.9 * expected:
-            return diagnostics.WARN, f"{message} instead of {expected:.1f}"
-        return diagnostics.OK, message
+        if len(radar.arrivals) < 3 or radar.rate >= 0.9 * expected:
+            return diagnostics.OK, message
+        if len(self.bus.devices) > 1 and radar.rate >= 0.9 * self.bus.least_rate(radar):
+            return diagnostics.OK, f"{message}, shared line ({expected:.1f} alone)"
+        return diagnostics.WARN, f"{message} instead of {expected:.1f}"
 
 
 def main(args: Sequence[str] | None = None) -> None:

@@ -5,14 +5,18 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from driver_common.device import Device, DeviceOptions
+from driver_common.serial_link import BITS_PER_BYTE
+from driver_common.settings import RecordAccess, Value
 from isys_radar_driver.commands import Version
 from isys_radar_driver.frames import BROADCAST
 from isys_radar_driver.line import OVERHEAD
 from isys_radar_driver.models import FAST, Model
-from isys_radar_driver.targets import Resolution
+from isys_radar_driver.settings import record_of
+from isys_radar_driver.targets import TARGET_SIZES, Resolution
 
 RATE_WINDOW = 5.0  # s over which the rate is measured
 EARLY = 0.25  # cycles by which a list may come before it is expected
@@ -41,10 +45,20 @@ class Identity:
 
 @dataclass
 class Statistics:
-    """What was counted for one radar since the start."""
+    """What was counted for one radar since the start.
+
+    Attributes:
+        target_lists: Target lists that came.
+        lost_cycles: Cycles of which none came.
+        shared_cycles: Cycles that ended while the line served another radar.
+        clippings: Lists without targets, because the receiver was overloaded.
+        timeouts: Answers that did not come in time.
+        refusals: Answers with a failure.
+    """
 
     target_lists: int = 0
     lost_cycles: int = 0
+    shared_cycles: int = 0
     clippings: int = 0
     timeouts: int = 0
     refusals: int = 0
@@ -79,7 +93,15 @@ class Radar(Device):
         address: Its address, 0 while unknown.
         identity: Who it is; None while it is not connected.
         temperatures: Board temperatures in °C, by name.
-        measuring: Whether acquisition was started.
+        measuring: Whether acquisition was started; None while that is not known.
+        cycle_end: Monotonic time in s at which one of its cycles ended, as far as known.
+        aligned: Monotonic time in s of its last start.
+        arrivals: Monotonic times in s at which target lists began, the last few seconds.
+        clippings: Those of them that told of an overloaded receiver.
+        fixed_targets: Learned length of fixed-length lists, 0 while unknown.
+        refused: How many steps in a row it refused.
+        checks: How often it was checked for a reset.
+        check_due: Monotonic time in s of the next check.
     """
 
     KIND = "radar"
@@ -92,12 +114,16 @@ class Radar(Device):
         self.address = options.address
         self.identity: Identity | None = None
         self.temperatures: dict[str, float] = {}
-        self.measuring = False
+        self.measuring: bool | None = False
         self.statistics = Statistics()
+        self.cycle_end = 0.0
+        self.aligned = 0.0
         self.arrivals: deque[float] = deque()
-        self._cycle_end = 0.0  # when the cycle of the last arrival ended, as far as known
-        self.fixed_targets = 0  # learned length of fixed-length lists
-        self.checks = 0  # how often it was checked for a reset
+        self.clippings: deque[float] = deque()
+        self.fixed_targets = 0
+        self.refused = 0
+        self.checks = 0
+        self.check_due = 0.0
 
     def __str__(self) -> str:
         """Return name or address for messages."""
@@ -113,13 +139,40 @@ class Radar(Device):
         super().forget()
         self.identity = None
         self.measuring = False
-        self.arrivals.clear()
+        self.fixed_targets = 0
+        self.refused = 0
+        self.forget_lists()
         self.address = self.options.address
+
+    def forget_lists(self) -> None:
+        """Count rate and lost cycles from the next target list on."""
+        self.arrivals.clear()
+        self.clippings.clear()
+
+    def write(self, access: RecordAccess, changes: Mapping[str, Value]) -> dict[str, Value]:
+        """Write settings, see `Device.write`; some are stored for good at once."""
+        reported = super().write(access, changes)
+        self.unsaved -= {name for name in changes
+                         if record_of(self.settings[name]).stored_at_once}
+        return reported
+
+    def take_over(self, values: Mapping[str, Value]) -> None:
+        """Take note of values that a command changed on purpose, in the RAM."""
+        self.unsaved |= {name for name in values if values[name] != self.values[name]}
+        self.options.wanted |= values
+        self.values |= values
+        for name in values:
+            self.differing.pop(name, None)
 
     @property
     def model(self) -> Model | None:
         """The connected model."""
         return self.identity.model if self.identity else None
+
+    @property
+    def sends_lists(self) -> bool:
+        """Whether it measures, and hands out target lists over its serial port."""
+        return bool(self.measuring) and self.model is not None and self.model.has_target_lists
 
     @property
     def product(self) -> str:
@@ -156,8 +209,21 @@ class Radar(Device):
             return 0.0
         return (len(arrivals) - 1) / (arrivals[-1] - arrivals[0])
 
-    def resolution(self, baud_rate: int) -> Resolution:
+    @property
+    def is_overloaded(self) -> bool:
+        """Whether most of the last target lists told of an overloaded receiver."""
+        return 2 * len(self.clippings) > len(self.arrivals)
+
+    def list_size(self, resolution: Resolution) -> int:
+        """Return the bytes of the longest target list in the present measurement mode."""
+        return OVERHEAD + self.max_targets * TARGET_SIZES[resolution.bits]
+
+    def resolution(self, baud_rate: int, sharing: int = 1) -> Resolution:
         """Return the resolution to ask for; "auto" takes the finest that fits the cycle (I24).
+
+        Args:
+            baud_rate: In Bd.
+            sharing: How many radars share the line, and so the cycle.
 
         Raises:
             SettingError: The model does not have the resolution that was asked for.
@@ -165,21 +231,37 @@ class Radar(Device):
         assert self.model is not None
         possible = self.model.resolutions_of(self.options.resolution)
         for resolution in possible:
-            size = OVERHEAD + self.max_targets * (14 if resolution.bits == 32 else 7)
-            if size * 10 / baud_rate < self.cycle_time:
+            seconds = self.list_size(resolution) * BITS_PER_BYTE / baud_rate
+            if seconds * sharing < self.cycle_time:
                 return resolution
         return possible[-1]
 
-    def count_list(self, now: float, *, clipping: bool) -> None:
-        """Count a target list, and the cycles that passed without one."""
+    def count_list(self, now: float, *, clipping: bool, shared: bool = False) -> int:
+        """Count a target list, and the cycles that passed without one.
+
+        Args:
+            now: Monotonic time in s at which it began.
+            clipping: Whether the receiver was overloaded.
+            shared: Whether the line served another radar meanwhile.
+
+        Returns:
+            How many cycles passed without a list because the line is shared.
+        """
         self.statistics.target_lists += 1
         self.statistics.clippings += clipping
-        expected = now
+        expected, missed = now, 0
         if self.arrivals:
-            cycles = max(1, math.floor((now - self._cycle_end) / self.cycle_time + EARLY))
-            self.statistics.lost_cycles += cycles - 1
-            expected = self._cycle_end + cycles * self.cycle_time
-        self._cycle_end = min(now, (expected + now) / 2)  # lists come late, never early
+            cycles = max(1, math.floor((now - self.cycle_end) / self.cycle_time + EARLY))
+            missed = cycles - 1
+            expected = self.cycle_end + cycles * self.cycle_time
+        self.cycle_end = min(now, (expected + now) / 2)  # lists come late, never early
         self.arrivals.append(now)
-        while now - self.arrivals[0] > RATE_WINDOW:
-            self.arrivals.popleft()
+        self.clippings.extend([now] * clipping)
+        for times in (self.arrivals, self.clippings):
+            while times and now - times[0] > RATE_WINDOW:
+                times.popleft()
+        if shared and not self.misses:  # else the line was there, but no answer
+            self.statistics.shared_cycles += missed
+            return missed
+        self.statistics.lost_cycles += missed
+        return 0

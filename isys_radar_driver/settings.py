@@ -17,9 +17,10 @@ from isys_radar_driver.models import Model
 RecordOf = Callable[[int], IsysRecord]
 
 
-def _sensor(sub_function: int, *layout: str, has_location: bool = False) -> RecordOf:
+def _sensor(sub_function: int, *layout: str, has_location: bool = False,
+            stored_at_once: bool = False) -> RecordOf:
     return lambda _: IsysRecord(READ_SENSOR, sub_function, layout=layout,
-                                has_location=has_location)
+                                has_location=has_location, stored_at_once=stored_at_once)
 
 
 def _application(sub_function: int, *layout: str, has_location: bool = False) -> RecordOf:
@@ -91,7 +92,8 @@ _METRES = {"unit": "m", "factor": 0.1, "minimum": 0.0}
 _CENTIMETRES = {"unit": "m", "factor": 0.01, "minimum": 0.0}
 _VELOCITY = {"unit": "m/s", "factor": 0.1, "minimum": 0.0}
 _DEGREES = {"unit": "deg", "factor": 0.1}
-_CELSIUS = {"unit": "°C", "factor": 0.01, "minimum": -20.0, "maximum": 100.0}
+_CELSIUS = {"unit": "°C", "factor": 0.01}
+_BOARD_CELSIUS = {**_CELSIUS, "minimum": -20.0, "maximum": 100.0}
 _STOPPED = {"needs_stop": True}
 
 
@@ -127,7 +129,7 @@ ROWS = (
     Row("target_list_interface", _sensor(0x002C, "B", has_location=True), "3.3.4.8",
         "Interface on which the sensor sends target lists",
         more=_choices("disabled", "spi", "ethernet")),
-    Row("led", _sensor(0x002D, "B"), "3.3.4.9",
+    Row("led", _sensor(0x002D, "B", stored_at_once=True), "3.3.4.9",
         "Light-emitting diode; the device stores a change at once",
         more=_choices("disabled", "enabled", "no_blinking")),
     Row("line_filter{n}.enable", _line_filter(), "3.3.5.1",
@@ -199,10 +201,10 @@ ROWS = (
         "Step of the amplifier's potentiometer", more={"minimum": 0, "maximum": 255}),
     Row("output1.temperature_threshold_celsius",
         _application(0x0707, "h", "h", "h", has_location=True), "3.3.5.17",
-        "Temperature above which output 1 warns", more=_CELSIUS),
+        "Temperature above which output 1 warns", more=_BOARD_CELSIUS),
     Row("output2.temperature_threshold_celsius",
         _application(0x0707, "h", "h", "h", has_location=True), "3.3.5.17",
-        "Temperature above which output 2 gives an alarm", more={"field": 1, **_CELSIUS}),
+        "Temperature above which output 2 gives an alarm", more={"field": 1, **_BOARD_CELSIUS}),
     Row("output{n}.warning_mode", _warning(0x0709, "B"), "3.3.5.18",
         "What output {n} warns of", instances=PAIR,
         more=_choices("temperature", "range", first=1)),  # errata I11
@@ -246,8 +248,13 @@ def settings_of(model: Model) -> dict[str, Setting]:
             for setting in row.settings(model)}
 
 
+def record_of(setting: Setting) -> IsysRecord:
+    """Return where a setting lives."""
+    assert isinstance(setting.record, IsysRecord)
+    return setting.record
+
+
 def is_application_setting(setting: Setting) -> bool:
     """Whether "save application settings" stores it, rather than "save sensor settings"."""
-    record = setting.record
-    assert isinstance(record, IsysRecord)
+    record = record_of(setting)
     return record.function_code == READ_APPLICATION or record.sub_function in _THRESHOLDS

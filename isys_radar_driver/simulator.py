@@ -108,10 +108,13 @@ class SimulatedRadar:
     Attributes:
         model: Its model.
         address: Its address.
+        started: Monotonic time in s at which its first cycle began.
         scene: Truth of the targets; can be replaced.
         clipping: Whether the receiver is overloaded.
         refuse: Function codes which it refuses although it could.
         silent: Whether it does not answer.
+        strict: Whether it refuses a start while it measures, and a stop while it does not.
+        self_starting: Whether it measures from power-on, without being told.
     """
 
     def __init__(self, model: Model, address: int = 0, serial_number: int = 1) -> None:
@@ -123,6 +126,8 @@ class SimulatedRadar:
         self.clipping = False
         self.refuse: set[int] = set()
         self.silent = False
+        self.strict = False
+        self.self_starting = False
         self.temperature = 41.5
         self.measuring = False
         self.settings = settings_of(model)
@@ -134,7 +139,7 @@ class SimulatedRadar:
                             for record in self._fields}
         self.ram = self._factory()
         self.eeprom = dict(self.ram)
-        self._started = 0.0
+        self.started = 0.0
         self._ready = 0.0
 
     # --- for tests and people ---
@@ -142,8 +147,9 @@ class SimulatedRadar:
     def power_cycle(self, now: float | None = None) -> None:
         """Lose the RAM and the acquisition; answer again after the boot time."""
         self.ram = dict(self.eeprom)
-        self.measuring = False
         self._ready = (time.monotonic() if now is None else now) + BOOT_TIME
+        self.measuring = self.self_starting
+        self.started = max(self._ready, 0.0)
 
     def value(self, name: str, location: Location = Location.RAM) -> Value:
         """Return the value of a setting."""
@@ -195,12 +201,8 @@ class SimulatedRadar:
                 break
         else:
             raise Refusal
-        if command is commands.START:
-            if not self.measuring:
-                self._started = now
-            self.measuring = True
-        elif command is commands.STOP:
-            self.measuring = False
+        if command in (commands.START, commands.STOP):
+            self._start_or_stop(command is commands.START, now)
         elif command is commands.SET_DEFAULT_TEMPERATURE_THRESHOLDS:
             for number, value in ((1, 55.0), (2, 60.0)):
                 self.set_value(f"output{number}.temperature_threshold_celsius", value)
@@ -209,6 +211,13 @@ class SimulatedRadar:
             offset = 3.0 if command is commands.READ_DSP_TEMPERATURE else 0.0
             return struct.pack(">h", round((self.temperature + offset) * 100))
         return b""
+
+    def _start_or_stop(self, start: bool, now: float) -> None:
+        if self.strict and start == self.measuring:
+            raise Refusal
+        if start and not self.measuring:
+            self.started = now
+        self.measuring = start
 
     def _read_sensor(self, pdu: bytes, now: float) -> bytes:
         if pdu == commands.READ_ADDRESS.sub_function:
@@ -261,8 +270,7 @@ class SimulatedRadar:
         for index, setting in self._fields[record].items():
             self._check(setting, values[index])
         self.ram[record] = values
-        if location is Location.EEPROM or any(
-                setting.name == "led" for setting in self._fields[record].values()):
+        if location is Location.EEPROM or record.stored_at_once:
             self.eeprom[record] = values
         return b""
 
@@ -428,8 +436,8 @@ class SimulatedRadar:
         if not self.measuring:
             return now
         cycle_time = self.model.cycle_time(self._mode)
-        cycles = math.floor((now - self._started) / cycle_time) + 1
-        return self._started + cycles * cycle_time
+        cycles = math.floor((now - self.started) / cycle_time) + 1
+        return self.started + cycles * cycle_time
 
     @staticmethod
     def _wall_time(now: float) -> float:

@@ -73,6 +73,7 @@ _FORMATS = {
     16: _Format(struct.Struct(">Bhhh"), Target(1.0, 0.01, 0.01, 10 * _MILLIDEGREE)),
     32: _Format(struct.Struct(">Hiii"), Target(0.01, 0.001, 1e-6, _MILLIDEGREE)),  # errata I5, I7
 }
+TARGET_SIZES = {bits: form.struct.size for bits, form in _FORMATS.items()}  # bytes
 
 
 def _format(bits: int, range_step_16: float) -> _Format:

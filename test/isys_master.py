@@ -38,7 +38,7 @@ class Recorder(BusRecorder, Listener):
     def on_digital_outputs(self, radar, values, stamp):
         self.digital_outputs.append(values)
 
-    def on_range_list(self, radar, values, stamp):
+    def on_range_list(self, radar, values, targets, stamp):
         self.range_lists.append((values, stamp))
 
     def on_temperatures(self, radar, stamp):

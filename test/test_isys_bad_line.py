@@ -25,7 +25,7 @@ from driver_common.errors import FrameError, LinkError, NoAnswerError, RefusedEr
 from isys_radar_driver import commands, session
 from isys_radar_driver import line as isys_line
 from isys_radar_driver.commands import Location
-from isys_radar_driver.frames import FrameParser
+from isys_radar_driver.frames import FAILURE, MASTER, Frame, FrameParser
 from isys_radar_driver.radar import Options
 from isys_radar_driver.session import RadarBus
 from isys_radar_driver.targets import Target
@@ -68,6 +68,92 @@ def test_a_reset_without_notice_is_noticed_by_the_refusal(connect):
     assert master.heard.lost == []
     assert simulated.value("output1.range_max") == 42.0
     assert any("configuring it again" in note for note in master.heard.notes)
+
+
+@pytest.fixture
+def self_starting(connect):
+    """A radar that measures with a setting in its RAM, and will measure after a reset as well."""
+    master, line, simulated = connect(wanted={"output1.range_max": 42.0})
+    simulated.self_starting = True
+    master.measure()
+    return master, line, simulated
+
+
+def test_a_radar_that_measures_on_after_a_reset_is_noticed_by_its_settings(
+        self_starting, monkeypatch):
+    master, _, simulated = self_starting
+    monkeypatch.setattr(session, "CHECK_PERIOD", 0.3)
+    master.until(lambda: master.radar.checks > 1)
+    simulated.power_cycle(now=-math.inf)  # it answers again at once
+    master.until(lambda: simulated.value("output1.range_max") == 42.0)
+    master.lists()
+    assert simulated.measuring
+    assert master.heard.lost == []
+    assert any("output1.range_max is 150 m, it was 42 m" in note for note in master.heard.notes)
+
+
+def test_after_a_silence_the_settings_are_looked_at_before_a_list_is_taken(self_starting):
+    master, line, simulated = self_starting
+    master.radar.check_due = math.inf
+    simulated.power_cycle(now=-math.inf)
+    simulated.scene = lambda now: [Target(40.0, 1.0, 100.0, 0.0)]  # beyond what is wanted
+    misses = iter([True])
+    line.faults = Script(lambda due, reply: [] if next(misses, False) else [(due, reply)])
+    before = len(master.heard.lists)
+    master.until(lambda: master.radar.statistics.timeouts)
+    master.lists(2)
+    assert [measured.targets for _, measured, _ in master.heard.lists[before:]] == [(), ()]
+    assert simulated.value("output1.range_max") == 42.0
+
+
+@pytest.mark.parametrize(("model", "fits"), [("iSYS-4001", True), ("iSYS-4003", False),
+                                             ("iSYS-6003", True), ("iSYS-6006", False)])
+def test_a_radar_is_checked_while_it_measures_where_that_costs_no_cycle(connect, model, fits):
+    master, *_ = connect(model, baud_rate=0)
+    assert master.bus._is_check_due(master.radar) == fits
+
+
+# --- refusals ----------------------------------------------------------------------------------
+
+def test_a_radar_that_refuses_target_lists_stays_connected_and_is_told_once(connect):
+    master, _, simulated = connect(output=3)
+    requests = counted_requests(simulated)
+    reply = simulated.reply
+
+    def refuse(request, now):
+        refused = request.function_code == 0xDA and request.pdu[0] == 3
+        return (now, Frame(MASTER, 128, FAILURE)) if refused else reply(request, now)
+
+    simulated.reply = refuse
+    master.bus.set_active(True)
+    master.until(lambda: master.radar.refused > 4)
+    (again, refusal) = master.heard.warnings
+    assert again == "it refuses to measure, as after a reset; configuring it again"
+    assert refusal.startswith("no target list of output 3 in 32 bit, change output or "
+                              "target_list_resolution: address 128 answers with failure (0xFD)")
+    assert str(master.radar.error) in refusal
+    assert (master.heard.lost, master.heard.found) == ([], [""])
+    assert requests[-1] - requests[-4] > 0.2  # ever more rarely
+    master.radar.options.output = 1
+    master.lists(2)
+    assert master.radar.error is None
+    assert master.heard.notes[-1] == "is well again"
+
+
+def test_a_radar_that_cannot_be_configured_again_is_found_anew(self_starting):
+    master, line, simulated = self_starting
+    master.radar.check_due = 0.0
+    simulated.power_cycle(now=-math.inf)
+    get_through = iter([True, False, False])  # the check that shows the reset, then both attempts
+    line.faults = Script(lambda due, reply: (
+        [(due, reply)] if function_code(reply) != commands.READ_APPLICATION
+        or next(get_through, True) else []))
+    master.lose()
+    assert master.radar.identity is None
+    assert any("configuring it again" in note for note in master.heard.notes)
+    master.lists()
+    assert simulated.value("output1.range_max") == 42.0
+    assert master.radar.values == {name: simulated.value(name) for name in simulated.settings}
 
 
 @pytest.mark.parametrize("name", ["iSYS-4001", "iSYS-5010", "iSYS-5020", "iSYS-5110"])
@@ -309,6 +395,63 @@ def test_several_radars_take_turns(start):
     assert abs(counts["front"] - counts["rear"]) <= 1
 
 
+def two_radars(start, **options):
+    line, first, second = start("iSYS-4001", addresses=[10, 11], **options)
+    master = Master(line.port, Options("front", address=10), Options("rear", address=11)).find()
+    return master, first, second
+
+
+def out_of_phase(first, second):
+    """Return how far the ends of two cycles lie apart, in cycles: 0 together, 0.5 in turn."""
+    return abs(math.remainder(first.started - second.started, 0.075)) / 0.075
+
+
+def missed(master):
+    return sum(radar.statistics.shared_cycles + radar.statistics.lost_cycles
+               for radar in master.bus.devices)
+
+
+def test_radars_on_one_line_measure_in_turn_and_each_gets_its_own_cycle(start):
+    master, first, second = two_radars(start)
+    master.measure(2)
+    assert out_of_phase(first, second) > 0.3
+    before = missed(master)
+    master.lists(40)
+    assert missed(master) - before < 10  # together they would miss 40
+
+
+def test_a_radar_that_starts_again_finds_its_turn(start):
+    master, first, second = two_radars(start)
+    master.measure(4)
+    for radar, simulated in zip(master.bus.devices, (first, second), strict=True):
+        master.bus.set_enabled(radar, False)
+        master.lists()
+        master.bus.set_enabled(radar, True)
+        assert simulated.measuring
+        assert out_of_phase(first, second) > 0.3
+
+
+def test_radars_whose_clocks_drifted_together_are_parted_again(start, monkeypatch):
+    monkeypatch.setattr(session, "REALIGN_PERIOD", 0.5)
+    master, first, second = two_radars(start)
+    master.measure(4)
+    second.started = first.started
+    master.until(lambda: out_of_phase(first, second) > 0.3)
+    assert master.heard.lost == []
+
+
+def test_cycles_that_the_line_leaves_to_another_radar_are_not_lost(start, monkeypatch):
+    master, first, second = two_radars(start)
+    master.measure(2)
+    second.started = first.started
+    master.lists(20)
+    assert sum(radar.statistics.shared_cycles for radar in master.bus.devices) > 10
+    assert sum(radar.statistics.lost_cycles for radar in master.bus.devices) < 3
+    assert master.bus.least_rate(master.radar) == pytest.approx(1 / 0.15)
+    for radar in master.bus.devices:
+        assert radar.rate > 0.8 * master.bus.least_rate(radar)
+
+
 def test_a_silent_radar_is_asked_more_and_more_rarely_and_returns_by_itself(start):
     line, first, second = start("iSYS-4001", addresses=[10, 11])
     master = Master(line.port, Options("front", address=10), Options("rear", address=11)).find()
@@ -319,13 +462,13 @@ def test_a_silent_radar_is_asked_more_and_more_rarely_and_returns_by_itself(star
     master.lists()
     truth = Truth(first)
     front = master.bus.devices[0].statistics
-    lists, lost = front.target_lists, front.lost_cycles
+    lists, left = front.target_lists, front.shared_cycles
     master.until(lambda: len(requests) >= 3)
     pauses = np.diff(requests)
     assert pauses[1] > 1.2 * pauses[0]
     cycles = round((truth.recorded[-1][0] - truth.recorded[0][0]) / 0.075) + 1
     assert front.target_lists - lists > 0.5 * cycles  # it waits for the other's time-outs alone
-    assert (front.target_lists - lists) + (front.lost_cycles - lost) == pytest.approx(cycles, abs=3)
+    assert front.target_lists - lists + front.shared_cycles - left == pytest.approx(cycles, abs=3)
     second.silent = False
     start_of_return = len(master.heard.lists)
     master.until(lambda: "rear" in [name for name, *_ in master.heard.lists[start_of_return:]])

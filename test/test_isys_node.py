@@ -7,6 +7,7 @@ import json
 import math
 import signal
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,8 +18,11 @@ from std_msgs.msg import Float32MultiArray
 
 from driver_common import diagnostics
 from isys_radar_driver.commands import READ_APPLICATION, Location
+from isys_radar_driver.frames import READ_TARGET_LIST
 from isys_radar_driver.models import find_model
 from isys_radar_driver.node import IsysRadarNode
+from isys_radar_driver.radar import Identity, Options, Radar
+from isys_radar_driver.session import Listener, RadarBus
 from isys_radar_driver.settings import settings_of
 from isys_radar_driver.targets import Target
 
@@ -440,6 +444,7 @@ def test_a_setting_of_a_radar_that_was_never_there_says_so(ros, launch):
 
 def test_a_resolution_that_the_model_lacks_is_refused(of_each_kind):
     here = of_each_kind("iSYS-6005")
+    wait_for_points(here.remote)
     result = here.remote.set("target_list_resolution", "16")
     assert not result.successful
     assert "iSYS-6005 has no target lists of 16 bit" in result.reason
@@ -485,8 +490,12 @@ def test_a_clipping_receiver_gives_an_empty_cloud(shared):
     cloud = wait_for_points(shared.remote, lambda cloud: cloud.width == 0)
     assert (len(cloud.data), cloud.row_step, cloud.height) == (0, 0, 1)
     assert tuple(field.name for field in cloud.fields) == FIELDS
-    shared.ros.wait_for_status("shared: radar", lambda status: int(status.values["clippings"]) > 0)
+    status = shared.ros.wait_for_status(
+        "shared: radar", lambda status: "overloaded" in status.message)
+    assert (status.level, status.message) == (WARN, "receiver overloaded, no targets")
+    assert int(status.values["clippings"]) > 0
     shared.radar.clipping = False
+    shared.ros.wait_for_status("shared: radar", lambda status: status.level == OK)
 
 
 def test_every_cycle_is_published_or_counted_as_lost(shared):
@@ -543,6 +552,15 @@ def test_range_and_temperature_are_published_where_asked_for(station):
     assert abs(stamp_of(ranges[-1]) - stamp_of(temperatures[-1])) < 1.0
 
 
+def test_a_range_without_a_target_is_infinite_and_unknown_while_clipping(station):
+    here = station("iSYS-6203", {"publish_range_list": True})
+    here.radar.scene = lambda now: []
+    ranges = here.remote.subscribe(Range, "range")
+    here.ros.wait_until(lambda: ranges and ranges[-1].range == math.inf)
+    here.radar.clipping = True
+    here.ros.wait_until(lambda: math.isnan(ranges[-1].range))
+
+
 def test_raw_signals_are_published_on_request(station):
     here = station("iSYS-6003")
     signals = here.remote.subscribe(Float32MultiArray, "raw_signals")
@@ -595,7 +613,7 @@ def test_saving_is_previewed_and_keeps_the_settings(shared):
     assert "output1.range_max: now 44 m" in preview.message
     assert shared.radar.value("output1.range_max", Location.EEPROM) == 150.0
     response = shared.remote.trigger("save_application_settings")
-    assert response.message == "saved; changed since the start: output1.range_max"
+    assert response.message == "saved; changed before: output1.range_max"
     assert shared.radar.value("output1.range_max", Location.EEPROM) == 44.0
     assert shared.radar.value("frequency_channel", Location.EEPROM) == 1
     assert shared.remote.trigger("save_sensor_settings").success
@@ -617,9 +635,35 @@ def test_the_preview_shows_what_the_eeprom_holds_where_that_can_be_read(station)
     here.process.wait_for_line("wrote")
     response = here.remote.trigger("preview_save")
     assert response.message == "saving would change output2.range_warning: 0 m → 1.5 m"
+
+
+def test_default_temperature_thresholds_are_shown(station):
+    name = "output1.temperature_threshold_celsius"
+    here = station("iSYS-6203", {name: 30.0})
+    here.ros.wait_until(lambda: name in here.remote.names())
+    assert here.remote.get(name) == 30.0
     response = here.remote.trigger("set_default_temperature_thresholds")
     assert response.success
     assert response.message == "temperature thresholds are 55 °C, 60 °C, 0 °C"
+    here.ros.wait_until(lambda: here.remote.get(name) == 55.0)
+
+
+def test_a_model_without_a_command_to_save_keeps_what_it_can(station):
+    here = station("iSYS-5010", {"frequency_channel": 2, "rcs_output": True})
+    here.process.wait_for_line("wrote")
+    cannot = "; the iSYS-5010 cannot store frequency_channel: lost at power-off"
+    response = here.remote.trigger("preview_save")
+    assert response.message == "saving would change rcs_output: False → True" + cannot
+    response = here.remote.trigger("save_all_settings")
+    assert response.message == "saved; changed before: rcs_output" + cannot
+    assert here.radar.value("rcs_output", Location.EEPROM) is True
+    response = here.remote.trigger("preview_save")
+    assert response.message == "saving would change nothing that is known" + cannot
+    response = here.remote.trigger("save_application_settings")
+    assert response.message == "nothing to save"
+    response = here.remote.trigger("save_sensor_settings")
+    assert not response.success
+    assert "iSYS-5010 cannot save the sensor settings" in response.message
 
 
 @pytest.mark.parametrize(("service", "words"), [
@@ -682,6 +726,33 @@ def test_diagnostics_of_a_healthy_radar(shared):
         assert int(values[name]) >= 0
     again = shared.ros.wait_for_status("shared: radar")
     assert int(again.values["target lists"]) >= int(values["target lists"])
+
+
+def test_a_refusal_to_measure_is_in_the_diagnostics_until_it_is_over(shared):
+    shared.radar.refuse.add(READ_TARGET_LIST)
+    status = shared.ros.wait_for_status(
+        "shared: radar", lambda status: "no target list" in status.message)
+    assert status.level == WARN
+    assert "of output 1 in 32 bit, change output or target_list_resolution" in status.message
+    assert status.values["model"] == "iSYS-4001"
+    shared.radar.refuse.clear()
+    shared.ros.wait_for_status("shared: radar", lambda status: status.level == OK)
+
+
+@pytest.mark.parametrize(("rate", "level", "message"), [
+    (13.0, OK, "13.0 target lists per second"),
+    (6.6, OK, "6.6 target lists per second, shared line (13.3 alone)"),
+    (3.0, WARN, "3.0 target lists per second instead of 13.3")])
+def test_the_rate_on_a_shared_line_is_compared_with_what_it_can_carry(
+        monkeypatch, rate, level, message):
+    monkeypatch.setattr(Radar, "rate", rate)
+    bus = RadarBus("", 0, [Options("front", address=10), Options("rear", address=11)], Listener())
+    for radar in bus.devices:
+        radar.identity = Identity(find_model("4001"), "", None, None, None, None)
+        radar.measuring = True
+        radar.arrivals.extend(range(9))
+    node = SimpleNamespace(bus=bus)
+    assert IsysRadarNode._health_of_rate(node, bus.devices[0]) == (bytes((level,)), message)
 
 
 def test_settings_that_differ_are_in_the_diagnostics(station):
@@ -794,6 +865,13 @@ def test_a_radar_can_be_simulated_in_the_node(ros, launch):
     radar = ros.remote(NAME)
     wait_for_points(radar)
     assert radar.get("measurement_mode") == "multi_target"
+    process.stop()
+
+
+@pytest.mark.parametrize("model", [4001, "4001", "isys-4001"])
+def test_a_model_may_be_given_as_a_number(launch, model):
+    process = launch({"serial_port": "sim://4001", "model": model})
+    process.wait_for_line("connected to iSYS-4001")
     process.stop()
 
 

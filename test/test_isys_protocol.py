@@ -285,7 +285,7 @@ LIMITS = {
     "amplifier_potentiometer": (0, 255, ""),
     "output1.temperature_threshold_celsius": (-20, 100, "°C"),
     "output2.temperature_threshold_celsius": (-20, 100, "°C"),
-    "output1.temperature_warning_celsius": (-20, 100, "°C"),
+    "output1.temperature_warning_celsius": (-327.68, 327.67, "°C"),
     "output1.range_warning": (0, 429496.7295, "m"),
     "moving_target_sensitivity.near_db": (-3276.8, 3276.7, "dB"),
     "moving_target_sensitivity.main_db": (-3276.8, 3276.7, "dB"),

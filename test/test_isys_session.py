@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 
 import numpy as np
 import pytest
 from isys_master import (
+    FAST_LINE,
     Lab,
     Master,
     Script,
@@ -19,7 +21,7 @@ from isys_master import (
 
 from driver_common.errors import NoAnswerError, RefusedError, SettingError, WrongDeviceError
 from driver_common.simulated_line import Faults
-from isys_radar_driver import commands, session
+from isys_radar_driver import commands, session, simulator
 from isys_radar_driver.commands import Location
 from isys_radar_driver.frames import FAILURE, MASTER, Frame
 from isys_radar_driver.models import MODELS, find_model
@@ -377,6 +379,68 @@ def test_the_measurement_mode_changes_cycle_time_and_targets(connect):
     assert (master.radar.cycle_time, master.radar.max_targets) == (0.05, 1)
 
 
+def test_what_the_device_stores_at_once_is_not_unsaved(connect):
+    master, _, simulated = connect()
+    master.bus.write(master.radar, {"led": "disabled", "output1.range_max": 10.0})
+    assert simulated.value("led", Location.EEPROM) == "disabled"
+    assert master.radar.unsaved == {"output1.range_max"}
+
+
+# --- start and stop ----------------------------------------------------------------------------
+
+@pytest.mark.parametrize("running", [True, False])
+def test_a_radar_may_refuse_to_start_or_stop_again(start, running):
+    line, simulated = start("iSYS-4001", baud_rate=FAST_LINE)
+    simulated.strict, simulated.measuring = True, running
+    master = Master(line.port, Options(wanted={"frequency_channel": 3}), baud_rate=FAST_LINE)
+    master.find()
+    assert simulated.value("frequency_channel") == 3
+    assert not simulated.measuring
+    master.measure(2)
+    assert master.heard.warnings == []
+    assert master.heard.lost == []
+
+
+def test_a_radar_that_measures_unknown_to_the_driver_is_started_all_the_same(connect):
+    master, _, simulated = connect()
+    simulated.strict = simulated.measuring = True
+    master.measure(2)
+    assert master.heard.warnings == []
+
+
+def test_a_radar_that_stopped_by_itself_can_be_stopped(connect):
+    master, _, simulated = connect()
+    master.bus.set_active(True)
+    simulated.strict, simulated.measuring = True, False
+    master.bus.set_active(False)
+    master.until(lambda: master.radar.measuring is False)
+    assert master.heard.lost == []
+
+
+def test_a_radar_that_does_not_start_is_not_taken_for_one_that_does(connect):
+    master, _, simulated = connect()
+    simulated.refuse.add(commands.START.function_code)
+    master.bus.set_active(True)
+    assert "cannot start the acquisition: address 128 answers with failure" in str(master.lose())
+    simulated.refuse.clear()
+    master.lists()
+
+
+def test_a_setting_that_was_written_counts_although_the_start_is_refused(connect):
+    master, _, simulated = connect()
+    master.measure()
+    reply = simulated.reply
+
+    def no_start(request, now):
+        refused = request == commands.START.request(128)
+        return (now, Frame(MASTER, 128, FAILURE)) if refused else reply(request, now)
+
+    simulated.reply = no_start
+    assert master.bus.write(master.radar, {"frequency_channel": 5}) == {"frequency_channel": 5}
+    simulated.reply = reply
+    master.lists()
+
+
 # --- settings that the user wants --------------------------------------------------------------
 
 WANTED = {"output1.range_max": 42.0, "frequency_channel": 5, "output2.direction": "receding"}
@@ -481,6 +545,19 @@ def test_a_resolution_that_the_model_lacks_is_refused_with_a_way_out(start):
     master.measure()
 
 
+@pytest.mark.parametrize(("sharing", "bits"), [(1, 32), (2, 16)])
+def test_auto_leaves_room_for_the_other_radars_of_the_line(sharing, bits):
+    assert radar_of("iSYS-4001").resolution(115200, sharing).bits == bits
+
+
+@pytest.mark.parametrize(("baud_rate", "bits"), [(0, 16), (115200, 32)])
+def test_behind_a_socket_the_line_has_the_baud_rate_of_the_model(start, baud_rate, bits):
+    line, _ = start("iSYS-4003", listen="127.0.0.1:0")
+    master = Master(line.port, baud_rate=baud_rate).find()
+    assert master.bus.line.baud_rate == (baud_rate or 9600)
+    assert master.radar.resolution(master.bus.line.baud_rate).bits == bits
+
+
 def test_the_length_of_a_fixed_length_list_is_learned(connect):
     master, _, _ = connect("iSYS-6005")
     assert master.radar.fixed_targets == 0
@@ -488,6 +565,17 @@ def test_the_length_of_a_fixed_length_list_is_learned(connect):
     assert master.radar.fixed_targets == 10
     assert all(len(measured.targets) == 3 for measured in master.measure(5))
     assert (master.bus.line.parser.damaged_frames, master.bus.line.parser.dropped_bytes) == (0, 0)
+
+
+def test_the_length_is_learned_again_after_a_reconnection(connect, monkeypatch):
+    master, _, _ = connect("iSYS-6005")
+    master.measure()
+    master.bus.close()
+    assert master.radar.fixed_targets == 0
+    monkeypatch.setattr(simulator, "FIXED_TARGETS", 12)  # another firmware
+    master.bus.open()
+    master.lists()
+    assert master.radar.fixed_targets == 12
 
 
 def test_the_length_is_learned_from_an_empty_list_as_well(connect):
@@ -506,8 +594,22 @@ def test_clipping_is_an_empty_list_and_counted(connect, model, bits):
         assert measured.clipping
         assert measured.targets == ()
     assert master.radar.statistics.clippings == 3
+    assert master.radar.is_overloaded
     simulated.clipping = False
     master.until(lambda: master.heard.lists[-1][1].targets)
+
+
+def test_a_receiver_is_overloaded_while_most_lists_say_so():
+    radar = radar_of("iSYS-4001")
+    assert not radar.is_overloaded
+    states = []
+    for cycle in range(60):
+        radar.count_list(100 + 0.075 * cycle, clipping=cycle < 20)
+        states.append(radar.is_overloaded)
+    assert states == [cycle < 39 for cycle in range(60)]
+    for cycle in range(200):
+        radar.count_list(200 + 0.075 * cycle, clipping=cycle == 0)
+    assert not radar.clippings  # that was too long ago
 
 
 @pytest.mark.parametrize("output", [1, 2, 3])
@@ -685,6 +787,18 @@ def test_default_temperature_thresholds(connect):
     assert simulated.value("output1.temperature_threshold_celsius") == 55.0
 
 
+def test_default_temperature_thresholds_stay_until_others_are_set(connect):
+    name = "output1.temperature_threshold_celsius"
+    master, _, simulated = connect("iSYS-6203", wanted={name: 30.0})
+    master.bus.save(master.radar, commands.SAVE_ALL_SETTINGS)
+    assert master.bus.set_default_thresholds(master.radar) == pytest.approx((55.0, 60.0, 0.0))
+    assert master.radar.values[name] == master.heard.values[-1][name] == 55.0
+    assert master.radar.unsaved == {name}
+    simulated.power_cycle()
+    assert simulated.value(name) == 30.0
+    master.until(lambda: simulated.value(name) == 55.0)
+
+
 def test_a_command_that_the_model_lacks_is_not_sent(connect):
     master, _, simulated = connect()
     requests = counted_requests(simulated)
@@ -707,6 +821,70 @@ def test_saving_keeps_the_settings_over_a_power_cycle(connect, command, saved):
     assert master.radar.unsaved == changes.keys() - set(saved)
     for name, value in changes.items():
         assert (simulated.value(name, Location.EEPROM) == value) == (name in saved)
+
+
+LOCATED = {  # settings with a location, of the sensor and of the application
+    "iSYS-5010": ({}, {"moving_target_sensitivity.main_db": 4.5, "rcs_output": True}),
+    "iSYS-5020": ({"target_list_interface": "spi"}, {"target_clustering": False}),
+    "iSYS-5110": ({"ip.address": "10.0.0.7", "ip_destination.record_port": 7},
+                  {"stop_bar_zone2.range_max": 12.0, "stop_bar_zone1.enable": True})}
+
+
+@pytest.mark.parametrize("model", LOCATED)
+@pytest.mark.parametrize("command", [commands.SAVE_SENSOR_SETTINGS,
+                                     commands.SAVE_APPLICATION_SETTINGS,
+                                     commands.SAVE_ALL_SETTINGS], ids=lambda command: command.name)
+def test_without_a_command_to_save_each_record_is_written_to_the_eeprom(connect, model, command):
+    master, _, simulated = connect(model)
+    sensor, application = LOCATED[model]
+    changes = {"frequency_channel": 2, **sensor, **application}
+    master.bus.write(master.radar, changes)
+    kept = {**(sensor if command is not commands.SAVE_APPLICATION_SETTINGS else {}),
+            **(application if command is not commands.SAVE_SENSOR_SETTINGS else {})}
+    master.bus.set_active(True)
+    assert master.bus.unsaved(master.radar, command) == sorted(kept)
+    if kept:
+        assert master.bus.save(master.radar, command) == sorted(kept)
+    else:
+        with pytest.raises(SettingError, match=f"{model} cannot save the sensor settings"):
+            master.bus.save(master.radar, command)
+    assert simulated.measuring
+    assert master.radar.unsaved == changes.keys() - kept.keys()
+    for name in changes:
+        assert (simulated.value(name, Location.EEPROM) == simulated.value(name)) == (name in kept)
+
+
+def test_what_no_command_can_save_is_named(connect):
+    master, _, _ = connect("iSYS-5010")
+    master.bus.write(master.radar, {"frequency_channel": 2, "rcs_output": True})
+    named = {possible: master.bus.unsaved(master.radar, commands.SAVE_ALL_SETTINGS,
+                                          possible=possible) for possible in (True, False)}
+    assert named == {True: ["rcs_output"], False: ["frequency_channel"]}
+
+
+def test_only_what_the_eeprom_does_not_hold_yet_is_written_to_it(connect):
+    master, _, simulated = connect("iSYS-5110")
+    simulated.set_value("ip.gateway", "10.0.0.1")  # by another program
+    written = []
+    write = simulated._write_record
+    simulated._write_record = lambda *request: written.append(request) or write(*request)
+    assert master.bus.save(master.radar, commands.SAVE_ALL_SETTINGS) == ["ip.gateway"]
+    assert master.bus.save(master.radar, commands.SAVE_ALL_SETTINGS) == []
+    assert len(written) == 1
+
+
+@pytest.mark.parametrize(("spoil", "words"), [
+    (lambda radar: radar.refuse.add(commands.READ_APPLICATION + 1),
+     "cannot save rcs_output: address 100 answers with failure"),
+    (lambda radar: setattr(radar, "_write_record", lambda *_: b""),
+     "took rcs_output but did not store it")])
+def test_a_record_that_is_not_stored_is_named(connect, spoil, words):
+    master, _, simulated = connect("iSYS-5010")
+    master.bus.write(master.radar, {"rcs_output": True})
+    spoil(simulated)
+    with pytest.raises(RefusedError, match=re.escape(words)):
+        master.bus.save(master.radar, commands.SAVE_ALL_SETTINGS)
+    assert master.radar.unsaved == {"rcs_output"}
 
 
 def test_writing_a_setting_leaves_the_eeprom_alone(connect):

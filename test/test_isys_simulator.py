@@ -9,6 +9,7 @@ import math
 import os
 import signal
 import socket
+import time
 
 import pytest
 from nodes import Process
@@ -139,6 +140,22 @@ def test_what_needs_the_acquisition_stopped_is_refused_while_it_runs():
     answer(line, STOP)
     assert answer(line, request) == "68 03 03 68 01 80 D3 54 16"
     assert radar.value("frequency_channel") == 3
+
+
+def test_a_strict_one_refuses_to_start_or_stop_again():
+    line, radar = line_of("4001")
+    radar.strict = True
+    assert [answer(line, request) for request in (STOP, START, START, STOP, STOP)] == [
+        REFUSED, ACKNOWLEDGED, REFUSED, ACKNOWLEDGED, REFUSED]
+
+
+def test_one_that_starts_by_itself_measures_after_a_power_cycle():
+    line, radar = line_of("4001")
+    radar.self_starting = True
+    radar.power_cycle(NOW)
+    ((end, _),) = line.receive(
+        commands.read_target_list(128, 1, Resolution.BITS_32).encode(), NOW + 0.51)
+    assert end == pytest.approx(NOW + 0.5 + 0.075)
 
 
 def test_target_lists_are_refused_while_it_does_not_measure():
@@ -494,6 +511,19 @@ def test_a_simulator_of_several_models_at_addresses(simulate, tmp_path):
     assert not os.path.lexists(path)
 
 
+def test_a_line_on_tcp_keeps_its_baud_rate():
+    line, _ = simulated_line(["4003"], listen="127.0.0.1:0")
+    line.start()
+    link = SerialLink(line.port, 9600)
+    link.write(commands.READ_DEVICE_NAME.request(128).encode())
+    start, data = time.monotonic(), b""
+    while len(data) < 26:
+        data += link.read(DEADLINE)
+    assert time.monotonic() - start > link.seconds(len(data))
+    link.close()
+    line.close()
+
+
 def test_a_simulator_on_tcp(simulate):
     process = simulate("--listen", "127.0.0.1:0")
     port = process.wait_for_line("socket://").split(": ")[0]
@@ -505,7 +535,8 @@ def test_a_simulator_obeys(simulate, tmp_path):
     path = str(tmp_path / "radar")
     process = simulate("--link", path)
     process.wait_for_line("commands: ")
-    for command in ("silent on", "silent off", "clipping on", "drop 0.5", "drop 0",
+    for command in ("silent on", "silent off", "clipping on", "strict on", "self-starting on",
+                    "drop 0.5", "drop 0",
                     "delay 0.001", "power-cycle"):
         process.tell(command)
         process.wait_for_line(f"done: {command}")
