@@ -37,6 +37,10 @@ _ADVICE = {
 class CanLink:
     """A CAN bus.
 
+    Attributes:
+        receive: Returns the next frame, or None after a time in s; raises what python-can does.
+        receive_buffer: Bytes that the kernel keeps for us, 0 while that is not known.
+
     Args:
         interface: Interface of python-can, such as "socketcan" or "socketcand".
         channel: Channel of the interface, such as "can0".
@@ -68,7 +72,8 @@ class CanLink:
                 AssertionError) as error:
             raise LinkError(f"cannot open {self}: {self._reason(error)}") from error
         self.receive = self._bus.recv
-        self._enlarge_receive_buffer()
+        self.receive_buffer = 0
+        self._prepare_socket()
 
     def __str__(self) -> str:
         """Return interface and channel."""
@@ -107,12 +112,34 @@ class CanLink:
             raise LinkError(f"{where}: that is no socketcand server; check host and port in "
                             "can_options")
 
-    def _enlarge_receive_buffer(self) -> None:
-        """Let the kernel keep what arrives while this process waits for the processor."""
-        with contextlib.suppress(OSError, NotImplementedError, ValueError):
-            duplicate = socket.socket(fileno=os.dup(self._bus.fileno()))
+    def _prepare_socket(self) -> None:
+        """Let the kernel keep what arrives while this process waits for the processor.
+
+        Raises:
+            LinkError: The kernel has an error for us; binding to a channel that is down gives none.
+        """
+        duplicate = self._socket()
+        if duplicate is None:
+            return
+        with duplicate:
             duplicate.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
-            duplicate.close()
+            self.receive_buffer = duplicate.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
+            fault = duplicate.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
+        if fault:
+            self.close()
+            raise LinkError(f"cannot open {self}: {self._reason(OSError(fault, ''))}")
+
+    def _socket(self) -> socket.socket | None:
+        """Return the socket behind the bus once more, None where there is another thing."""
+        try:
+            descriptor = os.dup(self._bus.fileno())
+        except (OSError, NotImplementedError, ValueError):
+            return None
+        try:
+            return socket.socket(fileno=descriptor)
+        except OSError:
+            os.close(descriptor)
+            return None
 
     def _reason(self, error: BaseException) -> str:
         cause: BaseException | None = error

@@ -10,6 +10,7 @@ from __future__ import annotations
 import ast
 import inspect
 import math
+import re
 import struct
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -86,7 +87,7 @@ def _empty() -> bytes:
 # --- system (section 10.2) ---
 
 def _set_state(state: NetworkState, location: CodeLocation = CodeLocation.NO_CHANGE) -> bytes:
-    return bytes((0x80 | location << 4 | state,))
+    return bytes((0x80 | CodeLocation(location) << 4 | NetworkState(state),))
 
 
 def _state(data: bytes) -> State:
@@ -366,6 +367,12 @@ def _measurement(element: CalibrationElement, dimension: int = 1,
                   reference_code(reference_voltage))) + bytes(4)
 
 
+def _last_measurement(element: CalibrationElement, dimension: int = 1,
+                      reference_voltage: float = 3.3) -> bytes:
+    return bytes((CalibrationMethod.MEASURE << 5, element, dimension,
+                  reference_code(reference_voltage))) + bytes(4)
+
+
 def _celsius(data: bytes) -> float:
     return int.from_bytes(_bytes(data)[4:], "little", signed=True) / 1000
 
@@ -404,6 +411,10 @@ WRITE_CALIBRATION_D = Command("write a calibration factor d", CONFIGURATION, 0x6
 MEASURE = Command("make a calibration measurement", CONFIGURATION, 0x62, _measurement,
                   lambda data: int.from_bytes(_bytes(data)[4:], "little"), mask=_HIDDEN_FIRST,
                   section="10.5.5")
+READ_MEASUREMENT = Command("read the last calibration measurement", CONFIGURATION, 0x62,
+                           _last_measurement,
+                           lambda data: int.from_bytes(_bytes(data)[4:], "little"),
+                           mask=_HIDDEN_FIRST, section="10.5.5")
 READ_TEMPERATURE = Command(
     "read the temperature", CONFIGURATION, 0x62,
     lambda: _measurement(CalibrationElement.TEMPERATURE, 1, TEMPERATURE_REFERENCE), _celsius,
@@ -500,7 +511,14 @@ COMMANDS: Mapping[str, Command[..., Any]] = {
     name.strip("_").lower() + (f"_{index + 1}" if isinstance(value, tuple) else ""): command
     for name, value in list(globals().items())
     for index, command in enumerate(value if isinstance(value, tuple) else (value,))
-    if isinstance(command, Command)}
+    if isinstance(command, Command) and not name.startswith("_")}
+_REQUESTS: Mapping[str, Callable[..., Request[Any]]] = {
+    **{name: command.request for name, command in COMMANDS.items()},
+    "read_acceleration": read_acceleration, "read_voltage": read_voltage}
+# Arguments that people give as the numbers of which they are made.
+_MADE_OF_NUMBERS: Mapping[str, Callable[..., Any]] = {
+    "AdcConfiguration": AdcConfiguration, "StreamFormat": StreamFormat, "UsedSensors": UsedSensors}
+_WORD = re.compile(r"""(?:b?'[^']*'|b?"[^"]*"|\S)+""")
 
 
 def parse_request(text: str, receiver: int) -> Request[Any]:
@@ -509,14 +527,18 @@ def parse_request(text: str, receiver: int) -> Request[Any]:
     Raises:
         SettingError: There is no such command, or its arguments do not fit.
     """
-    name, *words = text.split() or [""]
-    command = COMMANDS.get(name)
-    if command is None:
-        raise SettingError(f'there is no command "{name}"{suggestion(name, COMMANDS)}')
+    name, *words = _WORD.findall(text) or [""]
+    make = _REQUESTS.get(name)
+    if make is None:
+        raise SettingError(f'there is no command "{name}"{suggestion(name, _REQUESTS)}')
+    takes = inspect.signature(COMMANDS[name].encode if name in COMMANDS else make)
     try:
-        return command.request(receiver, *map(ast.literal_eval, words))
+        values = [ast.literal_eval(word) for word in words]
+        kinds = [parameter.annotation for parameter in takes.parameters.values()]
+        if len(kinds) == 1 and kinds[0] in _MADE_OF_NUMBERS:
+            values = [_MADE_OF_NUMBERS[kinds[0]](*values)]
+        return make(receiver, *values)
     except (AttributeError, TypeError, ValueError, SyntaxError, struct.error) as error:
-        takes = inspect.signature(command.encode)
         raise SettingError(f"{name} takes {takes}, not {' '.join(words) or 'nothing'}: "
                            f"{error}") from None
 

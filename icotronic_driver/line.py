@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import can
 
-from driver_common.can_link import CanLink, parse_options
+from driver_common.can_link import RECEIVE_BUFFER, CanLink, parse_options
 from driver_common.errors import FrameError, LinkError, NoAnswerError
 from icotronic_driver.commands import ACCELERATION_DATA
 from icotronic_driver.identifier import SPU_1, Identifier, node_name, receiver_filter
@@ -21,6 +21,7 @@ T = TypeVar("T")
 
 REPLY_TIMEOUT = 0.5  # s; behind the stationary unit there is a radio
 ATTEMPTS = 3  # a radio loses frames
+ENOUGH_BUFFER = 1024 * 1024  # bytes, in which about 0.4 s of the fastest stream fit
 ERROR_BUS_OFF = 0x40  # in the identifier of an error frame of the kernel
 FILTERS = (receiver_filter(SPU_1), (SPU_1 << 6, 0x1F << 6))  # for us; and as if from us
 STREAM_ID = ACCELERATION_DATA.encode()
@@ -65,6 +66,7 @@ class Line:
         self.on_stream: StreamHandler | None = None
         self._make_link = partial(CanLink, interface, channel, bitrate, options, FILTERS)
         self._link: CanLink | None = None
+        self.interface = interface
         self.name = f"{interface} {channel}"
 
     def open(self) -> None:
@@ -88,6 +90,15 @@ class Line:
         if self._link is None:
             raise LinkError(f"{self.name} is not open")
         return self._link
+
+    @property
+    def buffer_warning(self) -> str:
+        """What is to be said about the kernel's receive buffer, "" where it is large enough."""
+        size = self.link.receive_buffer
+        if self.interface != "socketcan" or not 0 < size < ENOUGH_BUFFER:
+            return ""
+        return (f"the kernel keeps only {size // 1024} KiB of frames while this host is busy; "
+                f"'sudo sysctl -w net.core.rmem_max={RECEIVE_BUFFER}' allows more")
 
     def listen(self, duration: float) -> None:
         """Receive for some s and hand over what arrives; raises LinkError."""

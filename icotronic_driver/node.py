@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from enum import Enum
 from functools import partial
@@ -20,10 +21,10 @@ from icotronic_driver.eeprom import PAGE_NAMES, Field, FieldValue
 from icotronic_driver.identifier import STH_1, STU_1
 from icotronic_driver.line import Line
 from icotronic_driver.sensor import Options, Phase, Sensor, UnitIdentity
-from icotronic_driver.session import IcotronicBus, Listener
+from icotronic_driver.session import STORED, IcotronicBus, Listener
 from icotronic_driver.settings import SETTINGS
 from icotronic_driver.simulator import simulated_network
-from icotronic_driver.streaming import AXES, LOAD_MAXIMUM
+from icotronic_driver.streaming import AXES
 from icotronic_driver.values import CLOCK
 from msg_conversions.battery import to_battery_state
 from msg_conversions.imu import UNKNOWN_VARIANCE, ImuTemplate
@@ -37,11 +38,13 @@ SIGNED_AXES = {sign + axis: code for code, (sign, axis) in enumerate(
 STREAM_OPTIONS = ("channels", *(f"axis.{axis}" for axis in AXES), "sample_rate",
                   "calibration_source", "acceleration_range_g", "linear_acceleration_stddev",
                   "time_offset")
+READING_UNITS = {"rssi": " [dBm]", "battery_voltage": " [V]", "temperature": " [°C]"}
+COLLISION = "two channels are mapped to the same axis; correct axis.x, axis.y and axis.z"
 RECEIVERS = {"sth": STH_1, "stu": STU_1}
 CLOCK_WAS_SET = 500_000_000  # ns by which stamps go back only if the host's clock does
+RECENT_TIME = 30.0  # s that count for whether all is well
 LOSS_LIMIT = 0.01  # share of the frames that may be lost without a warning
-QUEUE_TIME = 0.2  # s of samples that a publisher keeps for slow subscribers
-QUEUE_DEPTH = 2000  # enough for QUEUE_TIME at the default rate
+QUEUE_DEPTH = 2000  # samples that a publisher keeps for slow subscribers, 0.2 s at the usual rate
 
 
 class IcotronicNode(DeviceNode, Listener):
@@ -102,6 +105,7 @@ class IcotronicNode(DeviceNode, Listener):
         """Declare the parameters; raises SettingError."""
         self._stream_options: list[Any] = []
         self._topics: dict[str, Any] = {}
+        self._history: deque[_Counts] = deque()
         super().__init__("icotronic")
 
     # --- set-up ---
@@ -185,10 +189,9 @@ class IcotronicNode(DeviceNode, Listener):
 
     def on_stream(self, sensor: Sensor) -> Callable[[int, float, tuple[int, ...]], None]:
         """Return what publishes the samples of a stream that begins: the hot path."""
-        axes = [SIGNED_AXES[self.option(f"axis.{channel.name}")] for channel in sensor.channels]
-        if len({axis % 3 for axis in axes}) < len(axes):
-            self.get_logger().error("two channels are mapped to the same axis; correct the "
-                                    "parameters axis.x, axis.y and axis.z")
+        axes = self._axes(sensor)
+        if _collide(axes):
+            self.on_note(sensor, COLLISION, warning=True)
         variances = [UNKNOWN_VARIANCE] * 3
         for axis in axes:
             variances[axis % 3] = self.option("linear_acceleration_stddev") ** 2
@@ -202,6 +205,10 @@ class IcotronicNode(DeviceNode, Listener):
         publish = self._topics["imu"].handle.publish_raw
         return self.while_running(_publisher(
             template.serialised, publish, places, len(sensor.channels), offset))
+
+    def _axes(self, sensor: Sensor) -> list[int]:
+        """Return the signed axis of each channel."""
+        return [SIGNED_AXES[self.option(f"axis.{channel.name}")] for channel in sensor.channels]
 
     def on_readings(self, sensor: Sensor, name: str) -> None:
         """Publish a reading that has a topic."""
@@ -244,7 +251,7 @@ class IcotronicNode(DeviceNode, Listener):
     def _execute_command(self) -> str:
         text, receiver = self.option("command"), RECEIVERS[self.option("command_receiver")]
         request = parse_request(text, receiver)
-        return f"{request.name}: {self.call(lambda: self.bus.execute(request))}"
+        return f"{request.name}: {_in_words(self.call(lambda: self.bus.execute(request)))}"
 
     def _preview_save(self) -> str:
         return f"saving would change {_changes(self.call(self.bus.unsaved))}"
@@ -263,14 +270,17 @@ class IcotronicNode(DeviceNode, Listener):
             if identity is not None:
                 values |= _identity(title, identity)
         if sensor.phase is Phase.CONNECTED:
-            load = sensor.bus_load(self.option("can_bitrate"))
-            values |= {"sample rate [Hz]": sensor.sample_rate,
+            bitrate = self.option("can_bitrate")
+            values |= {"sample rate asked for [Hz]": self.option("sample_rate") or "by the ADC",
+                       "sample rate [Hz]": sensor.sample_rate,
                        "measured sample rate [Hz]": sensor.measured_rate,
-                       "bus load [%]": 100 * load}
+                       "bus load [%]": 100 * sensor.bus_load(bitrate),
+                       "bus load without stuff bits [%]":
+                       100 * sensor.bus_load(bitrate, stuffing=False)}
             values |= {f"calibration of channel {channel.name}":
                        f"{channel.slope:.6g} m/s² per step, offset {channel.offset:.6g} m/s², by "
                        f"{channel.source}" for channel in sensor.channels}
-        values |= {name.replace("_", " "): _in_words(value)
+        values |= {f"{name.replace('_', ' ')}{READING_UNITS.get(name, '')}": _in_words(value)
                    for name, value in vars(sensor.readings).items() if value is not None}
         values |= {
             "frames": counts.frames, "lost frames": counts.lost,
@@ -279,7 +289,7 @@ class IcotronicNode(DeviceNode, Listener):
             "stale frames": line.counts.stale, "foreign frames": line.counts.foreign,
             "frames of another host": line.counts.other_host, "error frames": line.counts.errors,
             "connections": sensor.connections, "time-outs": sensor.time_outs,
-            "unsaved settings": ", ".join(sorted(sensor.unsaved))}
+            "unsaved settings": ", ".join(sorted(sensor.unsaved & STORED.keys()))}
         values |= sensor.differences
         identity = sensor.identity
         return diagnostics.to_status(f"{self.get_name()}: {sensor.title}",
@@ -290,25 +300,55 @@ class IcotronicNode(DeviceNode, Listener):
         """Return level and message of the diagnostics."""
         if sensor.phase is not Phase.CONNECTED:
             return diagnostics.ERROR, str(sensor.error or sensor.phase.value)
-        bitrate, counts, complaints = self.option("can_bitrate"), sensor.statistics, []
-        if self.bus.line.counts.other_host:
-            complaints.append("another host on the bus uses our node number (SPU 1); end one of "
-                              "the two")
-        if counts.lost > LOSS_LIMIT * counts.frames:
-            complaints.append(f"{counts.lost} frames lost on the radio; bring the sensor nearer")
-        if sensor.differing:
-            complaints.append(f"{len(sensor.differing)} settings are not as wanted")
-        load = sensor.load_warning(bitrate)
-        if load:
-            complaints.append(load)
-        if load and sensor.bus_load(bitrate) > LOAD_MAXIMUM:
-            return diagnostics.ERROR, "; ".join(complaints)
+        complaints = self._complaints(sensor)
         if complaints:
-            return diagnostics.WARN, "; ".join(complaints)
+            overload = sensor.overloads(self.option("can_bitrate"))
+            return (diagnostics.ERROR if overload else diagnostics.WARN), "; ".join(complaints)
         if sensor.decoder is None:
             return diagnostics.OK, "connected, acquisition stopped"
-        return diagnostics.OK, (f"{sensor.measured_rate:.6g} samples per second, {counts.lost} "
-                                "frames lost")
+        return diagnostics.OK, (f"{sensor.measured_rate:.6g} samples per second, "
+                                f"{sensor.statistics.lost} frames lost")
+
+    def _complaints(self, sensor: Sensor) -> list[str]:
+        """Return what is wrong with a connected sensor."""
+        recent, by_range = self._recent_counts(sensor), self.option("calibration_source") == "range"
+        guessed = [channel.name for channel in sensor.channels
+                   if channel.by_range and not by_range]
+        found = {
+            "another host on the bus uses our node number (SPU 1); end one of the two":
+                recent.other_host,
+            f"{recent.lost} frames lost on the radio in the last {RECENT_TIME:g} s; bring the "
+            "sensor nearer": recent.lost > LOSS_LIMIT * recent.frames and not recent.other_host,
+            f"{recent.errors} error frames in the last {RECENT_TIME:g} s; check wiring, "
+            "termination and bit rate": recent.errors,
+            f"{len(sensor.differing)} settings are not as wanted": sensor.differing,
+            COLLISION: _collide(self._axes(sensor)),
+            f"no plausible calibration of channel {', '.join(guessed)}; it is a guess by "
+            "acceleration_range_g": guessed,
+            **dict.fromkeys(sensor.readings.faults, True),
+            sensor.load_warning(self.option("can_bitrate")): True}
+        return [text for text, is_so in found.items() if text and is_so]
+
+    def _recent_counts(self, sensor: Sensor) -> _Counts:
+        """Return what was counted in the last `RECENT_TIME` s."""
+        counts, line = sensor.statistics, self.bus.line.counts
+        now = _Counts(time.monotonic(), counts.frames, counts.lost, line.other_host, line.errors)
+        self._history.append(now)
+        while now.time - self._history[0].time > RECENT_TIME:
+            self._history.popleft()
+        first = self._history[0]
+        return _Counts(now.time - first.time, now.frames - first.frames, now.lost - first.lost,
+                       now.other_host - first.other_host, now.errors - first.errors)
+
+
+class _Counts(NamedTuple):
+    """What was counted until a time in s."""
+
+    time: float
+    frames: int
+    lost: int
+    other_host: int
+    errors: int
 
 
 class _Place(NamedTuple):
@@ -344,6 +384,10 @@ def _publisher(serialise: Callable[[int, float, float, float], bytes],
             stamp += step
 
     return publish_samples
+
+
+def _collide(axes: Sequence[int]) -> bool:
+    return len({axis % 3 for axis in axes}) < len(axes)
 
 
 def _identity(title: str, identity: UnitIdentity) -> dict[str, object]:

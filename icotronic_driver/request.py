@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, field
 from typing import Generic, ParamSpec, TypeVar
 
-from driver_common.errors import FrameError, RefusedError
-from icotronic_driver.identifier import SPU_1, Frame, Identifier, node_name
+from driver_common.errors import FrameError, RefusedError, SettingError
+from icotronic_driver.identifier import MAX_PAYLOAD, SPU_1, Frame, Identifier, node_name
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -15,7 +15,7 @@ Result = TypeVar("Result")
 
 ERRORS = {0: "specific error", 1: "not available", 2: "general error", 3: "write not allowed",
           4: "unsupported format", 5: "wrong key or magic number",
-          6: "no super frame inside a super frame"}  # section 10.9
+          6: "no super frame inside a super frame", 7: "EEPROM defect"}  # section 10.9
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,11 @@ class Request(Generic[T]):
     mask: bytes
     decode: Callable[[bytes], T]
     reasons: Mapping[int, str] = field(default_factory=dict)
+
+    @property
+    def writes(self) -> bool:
+        """Whether it changes a setting."""
+        return self.name.startswith("write ")
 
     @property
     def acknowledgement_id(self) -> int:
@@ -109,6 +114,13 @@ class Command(Generic[P, T]):
 
     def with_payload(self, receiver: int, payload: bytes,
                      decode: Callable[[bytes], Result]) -> Request[Result]:
-        """Return a request with this payload, whose answer is understood by `decode`."""
+        """Return a request with this payload, whose answer is understood by `decode`.
+
+        Raises:
+            SettingError: The payload does not fit into a frame.
+        """
+        if len(payload) > MAX_PAYLOAD:
+            raise SettingError(f"cannot {self.name}: {len(payload)} bytes do not fit into a frame, "
+                               f"at most {MAX_PAYLOAD} do")
         identifier = Identifier(self.block, self.block_command, SPU_1, receiver)
         return Request(self.name, Frame(identifier, payload), self.mask, decode, self.reasons)

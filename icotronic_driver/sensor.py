@@ -105,6 +105,18 @@ class Readings:
     under_voltages: int | None = None
     watchdog_resets: int | None = None
 
+    @property
+    def faults(self) -> list[str]:
+        """What the status words and error words complain about (sections 10.2.4 and 10.2.5)."""
+        units = (("sensor", self.sth_status, self.sth_errors),
+                 ("stationary unit", self.stu_status, self.stu_errors))
+        found = [(f"the {unit} reports {what}", is_so) for unit, status, errors in units
+                 for what, is_so in (
+                     ("an error", status and status.error),
+                     ("a failed transmission", errors and errors.transmission_failed),
+                     ("an overrun of its ADC", errors and errors.adc_overrun))]
+        return [text for text, is_so in found if is_so]
+
 
 class Channel(NamedTuple):
     """A streamed channel: acceleration in m/s² = slope · raw + offset."""
@@ -113,6 +125,7 @@ class Channel(NamedTuple):
     slope: float
     offset: float
     source: str  # of the calibration
+    by_range: bool = False  # whether that is a guess by the range of the sensor
 
 
 class Sensor(Device):
@@ -204,17 +217,23 @@ class Sensor(Device):
         """Samples/s of each channel on the host's clock, 0 while there is no stream."""
         return 1e9 / self.clock.period if self.decoder is not None else 0.0
 
-    def bus_load(self, bitrate: float) -> float:
+    def bus_load(self, bitrate: float, *, stuffing: bool = True) -> float:
         """Return the share of the bus that the stream takes (section 9.2.10)."""
-        return self.format.bus_load(self.adc.sample_rate, bitrate)
+        return self.format.bus_load(self.adc.sample_rate, bitrate, stuffing=stuffing)
+
+    def overloads(self, bitrate: float) -> bool:
+        """Whether the stream takes more of the bus than it ever may."""
+        return self.bus_load(bitrate, stuffing=False) > LOAD_MAXIMUM
 
     def load_warning(self, bitrate: float) -> str:
         """Return what is to be said about the bus load, "" where it is fine."""
+        if self.overloads(bitrate):
+            return (f"the stream takes {self.bus_load(bitrate, stuffing=False):.0%} of the bus "
+                    f"without stuff bits, more than {LOAD_MAXIMUM:.0%}")
         load = self.bus_load(bitrate)
-        if load <= LOAD_LIMIT:
-            return ""
-        limit = LOAD_MAXIMUM if load > LOAD_MAXIMUM else LOAD_LIMIT
-        return f"the stream takes {load:.0%} of the bus, more than {limit:.0%}"
+        if load > LOAD_LIMIT:
+            return f"the stream takes {load:.0%} of the bus, more than {LOAD_LIMIT:.0%}"
+        return ""
 
     @property
     def statistics(self) -> StreamStatistics:
@@ -237,7 +256,8 @@ class Sensor(Device):
         for axis in self.options.channels:
             calibration, source, complaint = self._calibration(axis)
             self.channels.append(Channel(axis, calibration.slope * STANDARD_GRAVITY,
-                                         calibration.offset * STANDARD_GRAVITY, source))
+                                         calibration.offset * STANDARD_GRAVITY, source,
+                                         by_range=source == self._range_text))
             if complaint:
                 complaints.append(f"channel {axis}: {complaint}; using {source}")
         return complaints
@@ -245,9 +265,8 @@ class Sensor(Device):
     def _calibration(self, axis: str) -> tuple[Calibration, str, str]:
         """Return calibration, its source and what is wrong with the device's own."""
         by_range = Calibration.of_range(self.options.acceleration_range)
-        range_text = f"the range of ±{self.options.acceleration_range:g} g"
         if self.options.calibration_source == "range":
-            return by_range, range_text, ""
+            return by_range, self._range_text, ""
         own = self._device_calibrations(axis)
         for source, calibration in own:
             if not calibration.fault:
@@ -257,7 +276,11 @@ class Sensor(Device):
         if self.options.calibration_source == "device" and own:
             source, calibration = own[0]
             return calibration, source, complaint
-        return by_range, range_text, complaint
+        return by_range, self._range_text, complaint
+
+    @property
+    def _range_text(self) -> str:
+        return f"the range of ±{self.options.acceleration_range:g} g"
 
     def _device_calibrations(self, axis: str) -> list[tuple[str, Calibration]]:
         found = []

@@ -48,6 +48,8 @@ PATIENCE = 3.0  # s until a sensor that only advertises now and then must have b
 KEEP_ALIVE = 1.0  # s between checks of a connection without a stream
 SILENCE = 1.0  # s without a frame after which the stream is looked after
 DISCONNECT_TIMEOUT = 0.3  # s
+RATE_SETTINGS = frozenset({"adc.prescaler", "adc.acquisition_time", "adc.oversampling_rate"})
+OTHER_HOST_TIME = 1.0  # s in which another host with the same connection lets itself be heard
 ON_THE_WAY = 0.05  # s without a frame after which none of a stopped stream will come
 
 
@@ -87,6 +89,7 @@ class IcotronicBus(DeviceBus[Sensor]):
         self._last_frame = 0.0
         self._host_clock = HostClock()
         self._told_rate = ""
+        self._told_buffer = False
         self._next_reading = 0.0
         self._readings = itertools.cycle(_READINGS)
 
@@ -106,6 +109,17 @@ class IcotronicBus(DeviceBus[Sensor]):
     def write(self, sensor: Sensor, changes: Mapping[str, Value]) -> dict[str, Value]:
         """Write settings, all or none, and return what the sensor reports; raises DriverError."""
         self._require(self.sensor)
+        given = RATE_SETTINGS.intersection(changes)
+        if given and self._follows_sample_rate:
+            raise SettingError(f"{min(given)} follows from sample_rate; set sample_rate to 0 first")
+        return self._write(sensor, changes)
+
+    @property
+    def _follows_sample_rate(self) -> bool:
+        options = self.sensor.options
+        return bool(options.sample_rate) and options.config_mode != "leave"
+
+    def _write(self, sensor: Sensor, changes: Mapping[str, Value]) -> dict[str, Value]:
         with self._stopped_for(changes):
             reported = sensor.write(_Access(self.line), changes)
             if any(name.startswith("calibration.") for name in changes):
@@ -146,10 +160,27 @@ class IcotronicBus(DeviceBus[Sensor]):
         self._lose(self.sensor, DriverError("reset, as asked for"))
 
     def execute(self, request: Request[T]) -> T:
-        """Carry out any request; raises DriverError."""
+        """Carry out any request, and read what it may have changed; raises DriverError."""
         if request.frame.identifier.receiver == STH_1:
             self._require(self.sensor)
-        return self.line.request(request)
+        result = self.line.request(request)
+        if request.writes and self.sensor.is_connected:
+            self._read_again()
+        return result
+
+    def _read_again(self) -> None:
+        """Read all settings, and take those that changed as wanted."""
+        sensor, before = self.sensor, self.sensor.values
+        sensor.read_all(_Access(self.line), SETTINGS, self._note)
+        changed = {name: value for name, value in sensor.values.items()
+                   if value != before.get(name)}
+        sensor.options.wanted |= changed
+        sensor.unsaved |= changed.keys()
+        self._choose_calibrations()
+        if changed and sensor.decoder is not None:
+            self._stop()
+            self._start_or_stop(sensor)
+        self._listener.on_values(sensor)
 
     def measure(self) -> dict[str, float]:
         """Make a calibration measurement of everything; return the results by name."""
@@ -173,11 +204,15 @@ class IcotronicBus(DeviceBus[Sensor]):
         return {field: self._read_field(node, field) for field in fields.values()}
 
     def unsaved(self) -> dict[Field, tuple[FieldValue, FieldValue]]:
-        """Return the EEPROM fields that a save would change: (stored, new)."""
+        """Return the EEPROM fields that a save would change: (stored, new).
+
+        These are only settings that were changed: what the sensor works with otherwise need not be
+        what its EEPROM is to keep.
+        """
         self._require(self.sensor)
         changes: dict[Field, tuple[FieldValue, FieldValue]] = {}
-        for name, field in _STORED.items():
-            if name in self.sensor.values:
+        for name, field in STORED.items():
+            if name in self.sensor.unsaved and name in self.sensor.values:
                 new = self.sensor.values[name]
                 assert isinstance(new, (int, float, str))
                 stored = self._read_field(STH_1, field)
@@ -200,7 +235,7 @@ class IcotronicBus(DeviceBus[Sensor]):
                 raise type(error)(f"{field.name} was not saved: {error} (saved before: "
                                   f"{', '.join(saved) or 'nothing'})") from error
             saved.append(field.name)
-        self.sensor.unsaved -= set(_STORED)
+        self.sensor.unsaved -= set(STORED)
         return changes
 
     def _save_field(self, field: Field, value: FieldValue) -> None:
@@ -214,6 +249,10 @@ class IcotronicBus(DeviceBus[Sensor]):
 
     def _open_link(self) -> None:
         self.line.open()
+        warning = self.line.buffer_warning
+        if warning and not self._told_buffer:
+            self._note(warning, warning=True)
+            self._told_buffer = True
         self._searching_since = time.monotonic()
 
     def _find(self, sensor: Sensor) -> None:
@@ -240,8 +279,18 @@ class IcotronicBus(DeviceBus[Sensor]):
         self._connect_again = 0.0
 
     def _give_up_old_connection(self) -> None:
-        """Release what a host that was killed, or a sensor that was reset, left connected."""
+        """Release what a host that was killed, or a sensor that was reset, left connected.
+
+        Raises:
+            WrongDeviceError: Another host is at work with it.
+        """
         if self.line.request(commands.CHECK_CONNECTED.request(STU_1)):
+            before = self.line.counts.other_host
+            self.line.listen(OTHER_HOST_TIME)
+            if self.line.counts.other_host != before:
+                raise WrongDeviceError("another host on the bus works with this stationary unit; "
+                                       "end one of the two")
+            self._note("releasing a connection that was left over")
             self.line.request(commands.DEACTIVATE_BLUETOOTH.request(STU_1))
 
     def _look_around(self) -> None:
@@ -355,7 +404,7 @@ class IcotronicBus(DeviceBus[Sensor]):
     def _apply_sample_rate(self) -> None:
         """Turn the wanted sample rate into settings of the ADC."""
         sensor = self.sensor
-        if sensor.options.sample_rate and sensor.options.config_mode != "leave":
+        if self._follows_sample_rate:
             total = sensor.options.sample_rate * sensor.format.channel_count
             adc = nearest_adc_configuration(total, sensor.adc.reference_voltage)
             sensor.options.wanted |= {
@@ -370,7 +419,7 @@ class IcotronicBus(DeviceBus[Sensor]):
             self._told_rate = text
 
     def _write_wanted(self, changes: Mapping[str, Value]) -> object:
-        return self.write(self.sensor, changes)
+        return self._write(self.sensor, changes)
 
     def _choose_calibrations(self) -> None:
         for complaint in self.sensor.choose_calibrations():
@@ -388,7 +437,7 @@ class IcotronicBus(DeviceBus[Sensor]):
             self.line.listen(LISTEN_TIME)
             if sensor.decoder.statistics.frames != frames:
                 self._last_frame = time.monotonic()
-            elif time.monotonic() - self._last_frame > SILENCE:
+            elif time.monotonic() - self._last_frame > self._longest_silence:
                 self._look_after_stream()
         else:
             if not self.line.request(commands.CHECK_CONNECTED.request(STU_1)):
@@ -396,6 +445,11 @@ class IcotronicBus(DeviceBus[Sensor]):
             sensor.due = time.monotonic() + KEEP_ALIVE
         if time.monotonic() >= self._next_reading:
             self._read_next()
+
+    @property
+    def _longest_silence(self) -> float:
+        """Time in s without a frame after which something is wrong with the stream."""
+        return max(SILENCE, 3 / self.sensor.format.frame_rate(self.sensor.adc.sample_rate))
 
     def _start_or_stop(self, sensor: Sensor) -> None:
         if not self.wants(sensor):
@@ -412,7 +466,8 @@ class IcotronicBus(DeviceBus[Sensor]):
         self.line.on_stream = self._stream_handler(sensor)
         self._last_frame = time.monotonic()
         try:
-            self.line.request(commands.START_ACCELERATION.request(STH_1, form))
+            self.line.request(commands.START_ACCELERATION.request(STH_1, form),
+                              self._longest_silence / 2)  # the first frame is the answer
         except DriverError:
             self._end_stream()
             raise
@@ -427,7 +482,7 @@ class IcotronicBus(DeviceBus[Sensor]):
 
         def handle(data: bytearray, bus_time: float, now: int) -> None:
             nonlocal lost
-            values = decode(bus_time, data)  # frames that waited for us were not late
+            values = decode(bus_time, data, now)  # frames that waited for us were not late
             if values is None:
                 return
             number = decoder.number * data_sets
@@ -599,7 +654,7 @@ _MEASUREMENTS = tuple(
     for dimension in dimensions)
 
 # Settings that the EEPROM can keep, and the field that keeps them.
-_STORED: Mapping[str, Field] = {
+STORED: Mapping[str, Field] = {
     "name": STH_EEPROM["STH Name"],
     "reduced_energy.sleep_time": STH_EEPROM["Sleep Time 1"],
     "reduced_energy.advertisement_time": STH_EEPROM["Advertisement Time 1"],

@@ -26,7 +26,7 @@ STANDARD_GRAVITY = 9.80665  # m/s²
 COUNTER_TURN = 256
 HALF_TURN = COUNTER_TURN // 2
 
-LOAD_LIMIT, LOAD_MAXIMUM = 0.4, 0.6  # section 9.2.10
+LOAD_LIMIT, LOAD_MAXIMUM = 0.4, 0.6  # with stuff bits, without (section 9.2.10)
 
 _HEAD = 2  # format and counter
 _MAX_DELAY = 0.25  # s; nothing on the way holds frames back for longer
@@ -104,10 +104,10 @@ class StreamFormat:
         return sample_rate / self.values_per_frame
 
     def bus_load(self, sample_rate: float, bit_rate: float = 1e6,
-                 data_bit_rate: float | None = None) -> float:
+                 data_bit_rate: float | None = None, *, stuffing: bool = True) -> float:
         """Return the share of the bus that the stream takes, 1.0 = all (see `bus_load`)."""
         return bus_load([(self.frame_rate(sample_rate), self.frame_length)], bit_rate,
-                        data_bit_rate)
+                        data_bit_rate, stuffing=stuffing)
 
 
 STOP = StreamFormat((False, False, False), 0)
@@ -265,6 +265,7 @@ class StreamDecoder:
         self._length = format.frame_length
         self._counter = 0
         self._arrival = 0.0
+        self._seen: int | None = None
         self._last: bytes | bytearray = b""
         self._doubt: _Doubt | None = None
         self._usual_gap = min(_MAX_DELAY, HALF_TURN / frame_rate) if frame_rate else math.inf
@@ -274,11 +275,17 @@ class StreamDecoder:
             f"<{_HEAD}x{('HB' if wide else 'H') * format.values_per_frame}{padding}x").unpack
         self._wide = wide
 
-    def decode_frame(self, arrival: float, data: bytes | bytearray) -> tuple[int, ...] | None:
+    def decode_frame(self, arrival: float, data: bytes | bytearray,
+                     seen: int | None = None) -> tuple[int, ...] | None:
         """Return the raw values of a data frame, oldest first; afterwards `number` is its number.
 
         Returns None for what is to be skipped: a duplicate, a damaged frame, one of another format;
         `statistics` tells which.
+
+        Args:
+            arrival: When it was on the bus, in s of a clock that may be set.
+            data: Its payload.
+            seen: When it came to us, in monotonic ns, where that is known.
         """
         if len(data) != self._length:
             self._count_unfit(data)
@@ -289,11 +296,12 @@ class StreamDecoder:
         counter = data[1]
         step = (counter - self._counter) & 0xFF
         if step != 1 or self._doubt or arrival - self._arrival > self._usual_gap:
-            step = self._unusual_step(step, arrival, data)
+            step = self._unusual_step(step, arrival, data, seen)
             if step == 0:
                 return None
         self._counter = counter
         self._arrival = arrival
+        self._seen = seen
         self._last = data
         self.number += step
         self.statistics.frames += 1
@@ -350,11 +358,14 @@ class StreamDecoder:
         return StreamBatch(np.array(numbers, np.int64), np.array(arrivals, np.float64),
                            np.array(rows, kind).reshape(shape))
 
-    def _unusual_step(self, step: int, arrival: float, data: bytes | bytearray) -> int:
+    def _unusual_step(self, step: int, arrival: float, data: bytes | bytearray,
+                      seen: int | None) -> int:
         """Return the frames from the last to this one, 0 for a duplicate; count what is missing."""
         if self.number < 0:
             return 1
         silence = arrival - self._arrival
+        if seen is not None and self._seen is not None:  # else it may be a clock that was set
+            silence = min(silence, (seen - self._seen) * 1e-9)
         if step == 0 and data != self._last and self._frame_rate:
             step = COUNTER_TURN  # it is none that came again
         turns = max(0, round((silence * self._frame_rate - step) / COUNTER_TURN))

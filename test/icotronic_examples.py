@@ -191,6 +191,8 @@ CONFIGURATION = [  # ADC: prescaler, acquisition time, oversampling rate, refere
             "A0 00 02 42 00 00 00 00", 0xA188_04F, "A0 00 02 42 00 00 00 00", 0),
     Example("10.5.5", "MEASURE", STH, (97, 1, 6.6, 2), 0xA18A_3C1,
             "C0 61 01 84 00 00 00 00", 0xA188_04F, "C0 61 01 84 00 00 00 00", 0),
+    Example("10.5.5", "READ_MEASUREMENT", STH, (ACCELERATION, 1), 0xA18A_3C1,
+            "60 00 01 42 00 00 00 00", 0xA188_04F, "60 00 01 42 34 80 00 00", 0x8034),
     Example("10.5.5", "READ_TEMPERATURE", STH, (), 0xA18A_3C1, "E0 01 01 19 00 00 00 00",
             0xA188_04F, "E0 01 01 19 5F 5D 00 00", 23.903),
     Example("10.5.5", "READ_TEMPERATURE", STH, (), 0xA18A_3C1, "E0 01 01 19 00 00 00 00",

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import errno
 import os
+import select
 import socket
 import threading
 import time
@@ -164,6 +165,31 @@ def test_the_bus_is_opened_as_asked_for(stand_in):
     assert stand_in[0].arguments == {
         "interface": "slcan", "channel": "/dev/ttyACM0", "bitrate": 500_000,
         "ignore_config": True, "ttyBaudrate": 115200}
+
+
+def test_an_error_that_waits_in_the_kernel_is_told_at_once(monkeypatch):
+    """As on a channel that is down: to bind to it is no error, but leaves one behind."""
+    bus = StandIn()
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        bus.socket.connect(free.getsockname())
+    bus.socket.send(b"")  # nobody listens there
+    poll = select.poll()
+    poll.register(bus.socket, select.POLLERR)
+    assert poll.poll(5000)
+    monkeypatch.setattr(can, "Bus", lambda **arguments: bus)
+    with pytest.raises(LinkError, match="cannot open socketcan can0: nothing listens there"):
+        open_link()
+    assert bus.closed == 1
+
+
+def test_a_bus_without_a_socket_leaves_nothing_open(monkeypatch, tmp_path):
+    bus = StandIn()
+    with (tmp_path / "serial").open("w") as file:
+        bus.fileno = file.fileno
+        monkeypatch.setattr(can, "Bus", lambda **arguments: bus)
+        before = len(os.listdir("/proc/self/fd"))
+        assert open_link("slcan").receive_buffer == 0
+        assert len(os.listdir("/proc/self/fd")) == before
 
 
 def test_the_kernel_filters_where_it_can(stand_in):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import socket
+import threading
 import time
 from types import SimpleNamespace
 
@@ -330,6 +331,37 @@ def test_a_connection_that_an_ended_host_left_is_given_up_for_the_wanted_sensor(
     assert not server.network.sensor("Spindle").streams
 
 
+def test_a_connection_of_a_living_host_is_left_alone(start, listen):
+    server = start()
+    first = listen(server).find()
+    first.sensor.options.status_period = 0.5  # it asks something every 50 ms
+    first.stream()
+    second = listen(server)
+    thread = threading.Thread(target=first.until, args=(lambda: second.heard.lost,))
+    thread.start()
+    assert "another host on the bus works with this stationary unit" in str(second.lose())
+    thread.join()
+    first.more()
+    assert first.heard.lost == []
+
+
+@pytest.mark.parametrize(("size", "warnings"), [(4 << 20, 0), (212992, 1), (0, 0)])
+def test_a_small_receive_buffer_of_the_kernel_is_told_once(start, listen, size, warnings):
+    host = listen(start()).find()
+    host.bus.line.interface = "socketcan"
+    open_line = host.bus.line.open
+
+    def open_with_size():
+        open_line()
+        host.bus.line.link.receive_buffer = size
+
+    host.bus.line.open = open_with_size
+    for _ in range(2):
+        host.bus.close()
+        host.bus.open()
+    assert len([text for text in host.heard.warnings if "net.core.rmem_max" in text]) == warnings
+
+
 def test_a_scan_lists_the_sensors_in_range(start, listen):
     server = start("Spindle", "Tool-7")
     server.network.sensor("Tool-7").rssi = -71
@@ -417,6 +449,13 @@ def test_a_stream_that_could_not_be_started_is_started_later(connect):
     assert str(host.lose()).startswith("STH 1 cannot start the stream: not available")
     simulated.refuse.clear()
     host.more()
+
+
+def test_a_slow_stream_is_not_taken_for_silent(connect):
+    host, _, _ = connect(sample_rate=6.0)  # a frame takes longer than any other may be silent
+    host.stream(4)
+    assert host.heard.warnings == []
+    assert host.sensor.connections == 1
 
 
 def test_a_stream_whose_restart_failed_is_started_later(connect, impatient):
@@ -1190,8 +1229,11 @@ def test_an_eeprom_that_is_not_initialised_is_told(start, listen):
         "the sensor's EEPROM is not initialised (0x17): at its next reset it takes default values"]
 
 
-def change_behind_the_back(simulated):
-    """Let the EEPROM hold something else than the sensor reported."""
+def change_what_the_eeprom_does_not_take(host, simulated):
+    """Change three settings, as with a firmware that keeps them in its RAM only."""
+    host.bus.write(host.sensor, {
+        "reduced_energy.sleep_time": 120.0, "calibration.acceleration_y.slope": 0.25,
+        "calibration.acceleration_y.offset": -3.0})
     simulated.eeprom["Sleep Time 1"] = 77.0
     set_calibration(simulated, 0.5, -7.0, "Y")
 
@@ -1199,18 +1241,18 @@ def change_behind_the_back(simulated):
 def test_a_preview_shows_what_a_save_would_change_and_changes_nothing(connect):
     host, _, simulated = connect()
     assert host.bus.unsaved() == {}
-    change_behind_the_back(simulated)
+    change_what_the_eeprom_does_not_take(host, simulated)
     writes = simulated.eeprom.writes
     changes = host.bus.unsaved()
     assert {field.name for field in changes} == {
         "Sleep Time 1", "Acceleration Y: Slope", "Acceleration Y: Offset"}
-    assert changes[STH_EEPROM["Sleep Time 1"]] == (77.0, 300.0)
+    assert changes[STH_EEPROM["Sleep Time 1"]] == (77.0, 120.0)
     assert simulated.eeprom.writes == writes
 
 
 def test_only_what_differs_is_saved_and_it_survives_a_reset(connect):
     host, _, simulated = connect()
-    change_behind_the_back(simulated)
+    change_what_the_eeprom_does_not_take(host, simulated)
     writes = simulated.eeprom.writes
     assert len(host.bus.save()) == 3
     assert simulated.eeprom.writes == writes + 3
@@ -1218,14 +1260,22 @@ def test_only_what_differs_is_saved_and_it_survives_a_reset(connect):
     assert simulated.eeprom.writes == writes + 3
     host.bus.reset(STH_1)
     host.find()
-    assert simulated.eeprom["Sleep Time 1"] == 300.0
-    assert host.sensor.values["reduced_energy.sleep_time"] == 300.0
+    assert simulated.eeprom["Sleep Time 1"] == 120.0
+    assert host.sensor.values["reduced_energy.sleep_time"] == 120.0
     assert host.bus.unsaved() == {}
+
+
+def test_what_was_not_changed_is_not_saved(connect):
+    host, _, simulated = connect()
+    set_calibration(simulated, 0.5, -7.0, "Z")  # the factors that the firmware works with differ
+    host.bus.write(host.sensor, {"name": "Spindle"})
+    host.bus.save()
+    assert simulated.eeprom["Acceleration Z: Slope"] == 0.5
 
 
 def test_a_locked_eeprom_refuses_a_save_with_the_field_that_it_refused(connect, monkeypatch):
     host, _, simulated = connect()
-    change_behind_the_back(simulated)
+    change_what_the_eeprom_does_not_take(host, simulated)
     simulated.eeprom["EEPROM Status"] = int(Status.LOCKED)
     write = simulated.eeprom.write
 
@@ -1246,16 +1296,16 @@ def test_a_locked_eeprom_refuses_a_save_with_the_field_that_it_refused(connect, 
 
 def test_an_eeprom_that_does_not_keep_what_it_acknowledged_is_noticed(connect, monkeypatch):
     host, _, simulated = connect()
-    change_behind_the_back(simulated)
+    change_what_the_eeprom_does_not_take(host, simulated)
     monkeypatch.setattr(simulated.eeprom, "write", lambda page, offset, content: None)
-    with pytest.raises(RefusedError, match="Sleep Time 1 was not saved: the EEPROM took 300 s "
+    with pytest.raises(RefusedError, match="Sleep Time 1 was not saved: the EEPROM took 120 s "
                                            "but holds 77 s; it may be locked"):
         host.bus.save()
 
 
 def test_a_save_that_is_not_possible_says_so(connect):
     host, _, simulated = connect()
-    change_behind_the_back(simulated)
+    change_what_the_eeprom_does_not_take(host, simulated)
     simulated.refuse.add((EEPROM, 0x01))
     with pytest.raises(RefusedError, match="cannot write the EEPROM: not available"):
         host.bus.save()

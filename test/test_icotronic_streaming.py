@@ -132,6 +132,23 @@ def _run(numbers: list[int], rate: float = 3175.0) -> StreamDecoder:
     return decoder
 
 
+@pytest.mark.parametrize("jump", [0.3, 3600.0, -3600.0])
+def test_a_clock_that_is_set_is_no_loss(jump: float) -> None:
+    decoder = StreamDecoder(StreamFormat(X, 3), 3175.0)
+    for number in range(2000):
+        time = number / 3175.0
+        decoder.decode_frame(time + jump * (number >= 1000), _frame(number), round(time * 1e9))
+    assert (decoder.statistics.lost, decoder.number) == (0, 1999)
+
+
+def test_an_outage_of_whole_turns_is_seen_by_both_clocks() -> None:
+    decoder = StreamDecoder(StreamFormat(X, 3), 3175.0)
+    for number in (*range(1000), *range(1000 + 10 * 256, 5000)):
+        time = number / 3175.0
+        decoder.decode_frame(time, _frame(number), round(time * 1e9))
+    assert (decoder.statistics.lost, decoder.number) == (10 * 256, 4999)
+
+
 @pytest.mark.parametrize("first", [0, 1, 2, 200, 255])
 def test_nothing_is_lost_over_wrap_arounds(first: int) -> None:  # errata C7
     decoder = _run(list(range(first, first + 1000)))
