@@ -25,7 +25,7 @@ from icotronic_driver.session import STORED, IcotronicBus, Listener
 from icotronic_driver.settings import SETTINGS
 from icotronic_driver.simulator import simulated_network
 from icotronic_driver.streaming import AXES
-from icotronic_driver.values import CLOCK
+from icotronic_driver.values import CLOCK, decode_mac, encode_mac
 from msg_conversions.battery import to_battery_state
 from msg_conversions.imu import UNKNOWN_VARIANCE, ImuTemplate
 from msg_conversions.temperature import to_temperature
@@ -118,8 +118,9 @@ class IcotronicNode(DeviceNode, Listener):
             self.simulator = simulator = simulated_network().start()
             interface = "socketcand"
             options = [f"host={simulator.host}", f"port={simulator.port}"]
+        mac = self.option("sensor_mac")
         sensor = Options(
-            sensor_name=self.option("sensor_name"), sensor_mac=self.option("sensor_mac"),
+            sensor_name=self.option("sensor_name"), sensor_mac=mac and decode_mac(encode_mac(mac)),
             sensor_number=self.option("sensor_number"),
             wanted=self.wanted_settings(""), config_mode=self.option("config_mode"))
         self._set_live(sensor)

@@ -13,6 +13,7 @@ from icotronic_driver.streaming import (
     LOAD_LIMIT,
     LOAD_MAXIMUM,
     STANDARD_GRAVITY,
+    USUAL_REFERENCE,
     Calibration,
     StreamDecoder,
     StreamFormat,
@@ -263,14 +264,17 @@ class Sensor(Device):
         return complaints
 
     def _calibration(self, axis: str) -> tuple[Calibration, str, str]:
-        """Return calibration, its source and what is wrong with the device's own."""
-        by_range = Calibration.of_range(self.options.acceleration_range)
+        """Return calibration, its source and what is wrong with it or the device's own."""
+        reference = self.adc.reference_voltage
+        by_range = Calibration.of_range(self.options.acceleration_range, reference)
         if self.options.calibration_source == "range":
             return by_range, self._range_text, ""
         own = self._device_calibrations(axis)
         for source, calibration in own:
             if not calibration.fault:
-                return calibration, source, ""
+                return calibration, source, "" if reference == USUAL_REFERENCE else (
+                    f"{source} are made for a reference voltage of {USUAL_REFERENCE:g} V, not for "
+                    f"{reference:g} V; correct them or set calibration_source to range")
         faults = "; ".join(f"{source}: {calibration.fault}" for source, calibration in own)
         complaint = f"no plausible calibration ({faults or 'none stored'})"
         if self.options.calibration_source == "device" and own:

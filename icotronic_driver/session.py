@@ -122,7 +122,7 @@ class IcotronicBus(DeviceBus[Sensor]):
     def _write(self, sensor: Sensor, changes: Mapping[str, Value]) -> dict[str, Value]:
         with self._stopped_for(changes):
             reported = sensor.write(_Access(self.line), changes)
-            if any(name.startswith("calibration.") for name in changes):
+            if any(name.startswith(("calibration.", "adc.reference")) for name in changes):
                 self._choose_calibrations()
         if "name" in changes and sensor.options.sensor_name:
             sensor.options.sensor_name = str(reported["name"])
@@ -317,7 +317,7 @@ class IcotronicBus(DeviceBus[Sensor]):
         options, seen = self.sensor.options, self.sensor.seen
         wanted = [one for one in seen
                   if (not options.sensor_name or one.name == options.sensor_name)
-                  and (not options.sensor_mac or one.mac == options.sensor_mac.upper())
+                  and (not options.sensor_mac or one.mac == options.sensor_mac)
                   and options.sensor_number in (-1, one.number)]
         named = options.sensor_name or options.sensor_mac or options.sensor_number >= 0
         now = time.monotonic()
@@ -335,7 +335,7 @@ class IcotronicBus(DeviceBus[Sensor]):
         if len(wanted) > 1:
             raise WrongDeviceError(
                 f"{len(wanted)} sensors are in range: {'; '.join(map(str, wanted))}; say which one "
-                "with the parameter sensor_name or sensor_mac")
+                "with the parameter sensor_name, sensor_mac or sensor_number")
         return wanted[0]
 
     def _await_connection(self) -> None:
@@ -599,7 +599,7 @@ def _raw(field: Field, value: FieldValue) -> bytes:
 
 def _described(options: Options) -> str:
     parts = [f' "{options.sensor_name}"'] if options.sensor_name else []
-    parts += [f" {options.sensor_mac.upper()}"] if options.sensor_mac else []
+    parts += [f" {options.sensor_mac}"] if options.sensor_mac else []
     parts += [f" number {options.sensor_number}"] if options.sensor_number >= 0 else []
     return "".join(parts)
 

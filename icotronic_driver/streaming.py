@@ -21,6 +21,7 @@ from icotronic_driver.identifier import MAX_PAYLOAD, MAX_PAYLOAD_FD, padded_leng
 DATA_SETS = (0, 1, 3, 6, 10, 15, 20, 30)  # by code; 0 stops the stream
 AXES = "xyz"
 ADC_MAX = 0xFFFF
+USUAL_REFERENCE = 3.3  # V, the sensor's supply; calibration factors are made with it
 SUPPLY_DIVIDER = 5.7  # 470 kΩ and 100 kΩ, section 10.3.3.1
 STANDARD_GRAVITY = 9.80665  # m/s²
 COUNTER_TURN = 256
@@ -158,9 +159,14 @@ class Calibration:
     offset: float
 
     @classmethod
-    def of_range(cls, limit: float) -> Calibration:
-        """Return the calibration of a sensor for ±`limit` g (errata C9)."""
-        return cls(2 * limit / ADC_MAX, -limit)
+    def of_range(cls, limit: float, reference: float = USUAL_REFERENCE) -> Calibration:
+        """Return the calibration of a sensor for ±`limit` g (errata C9).
+
+        Args:
+            limit: In g, where the sensor gives 0 V or its supply of 3.3 V.
+            reference: Reference voltage of the ADC in V, which is full scale.
+        """
+        return cls(2 * limit / ADC_MAX * reference / USUAL_REFERENCE, -limit)
 
     @property
     def fault(self) -> str:

@@ -631,7 +631,8 @@ def test_the_states_of_the_lifecycle_are_those_of_the_sensor(ros, start, launch)
 
 
 def test_a_simulated_sensor_comes_with_the_node(ros, launch, samples):
-    process = launch({"can_interface": "sim", "channels": "xyz", "sample_rate": 200.0})
+    process = launch({"can_interface": "sim", "channels": "xyz", "sample_rate": 200.0,
+                      "sensor_mac": "08-6b-d7-01-de-81"})
     process.wait_for_line('connected to "Test-STH" (08:6B:D7:01:DE:81), firmware 2.1.10; channels '
                           "x calibrated by the device's factors, y calibrated by the device's "
                           "factors, z calibrated by the device's factors;")
@@ -733,7 +734,8 @@ def test_several_sensors_in_range_are_listed(ros, start, launch):
     process = launch(at(server, sensor_name=""))
     process.wait_for_line('2 sensors are in range: "Spindle" (08:6B:D7:01:DE:81, number 0, '
                           '-52 dBm); "Tool-7" (08:6B:D7:01:DE:82, number 1, -52 dBm); say which '
-                          "one with the parameter sensor_name or sensor_mac (waiting for it)")
+                          "one with the parameter sensor_name, sensor_mac or sensor_number "
+                          "(waiting for it)")
     status = ros.wait_for_status(STATUS, lambda status: "2 sensors" in status.message)
     assert (status.level, status.values["connections"]) == (ERROR, "0")
     response = ros.remote(NAME).trigger("scan")
@@ -790,6 +792,7 @@ def test_a_wrong_parameter_ends_the_start_with_the_reason(launch):
         ({"channels": "w"}, "channels must be one of x, y, z, xy, xz, yz, xyz, not 'w'"),
         ({"sample_rate": -5.0}, "sample_rate = -5 Hz is out of range, allowed is 0 … "),
         ({"axis.y": "-w"}, "axis.y must be one of"),
+        ({"sensor_mac": "hello"}, '"hello" is not a MAC address such as 08:6B:D7:01:DE:81'),
         ({"config_mode": "pull"}, "config_mode must be one of push, check, leave"),
         ({"can_bitrate": "fast"}, "can_bitrate must be a whole number"))]
     for process, words in cases:

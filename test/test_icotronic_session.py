@@ -218,7 +218,7 @@ def test_the_only_sensor_in_range_is_connected_and_identified(connect, monkeypat
 
 @pytest.mark.parametrize("options", [
     {"sensor_name": "Tool-7"}, {"sensor_mac": "08:6B:D7:01:DE:82"},
-    {"sensor_mac": "08:6b:d7:01:de:82"}, {"sensor_number": 1},
+    {"sensor_number": 1},
     {"sensor_name": "Tool-7", "sensor_mac": "08:6B:D7:01:DE:82"}])
 def test_of_several_sensors_the_wanted_one_is_connected(start, listen, options):
     server = start("Spindle", "Tool-7", "Chuck")
@@ -233,8 +233,8 @@ def test_several_sensors_and_none_wanted_is_an_error_that_lists_them(start, list
     assert isinstance(error, WrongDeviceError)
     assert str(error) == (
         '2 sensors are in range: "Spindle" (08:6B:D7:01:DE:81, number 0, -52 dBm); "Tool-7" '
-        "(08:6B:D7:01:DE:82, number 1, -52 dBm); say which one with the parameter sensor_name or "
-        "sensor_mac")
+        "(08:6B:D7:01:DE:82, number 1, -52 dBm); say which one with the parameter sensor_name, "
+        "sensor_mac or sensor_number")
 
 
 def test_the_list_of_sensors_is_not_told_again_because_the_rssi_changes(start, listen):
@@ -256,7 +256,7 @@ def test_several_sensors_of_the_same_name_are_told_apart_by_mac(start, listen):
 
 def test_a_wanted_sensor_that_is_not_in_range_is_named_beside_those_that_are(start, listen):
     server = start("Spindle", "Tool-7")
-    host = listen(server, sensor_name="Chuck", sensor_mac="aa:bb:cc:dd:ee:ff")
+    host = listen(server, sensor_name="Chuck", sensor_mac="AA:BB:CC:DD:EE:FF")
     error = str(host.lose())
     assert error.startswith('the sensor "Chuck" AA:BB:CC:DD:EE:FF is not in range')
     assert '"Spindle" (08:6B' in error
@@ -1177,6 +1177,25 @@ def test_the_range_is_used_where_that_is_wanted(connect):
     host, *_ = connect(calibration_source="range", acceleration_range=50.0)
     assert host.sensor.channels[0].source == "the range of ±50 g"
     assert host.heard.warnings == []
+
+
+def test_the_range_counts_for_any_reference_voltage(connect):
+    host, _, simulated = connect(calibration_source="range")
+    host.bus.write(host.sensor, {"adc.reference_voltage": 5.0})
+    (channel,) = host.sensor.channels
+    times = np.array([0.0])
+    (raw, *_), truth = simulated.raw_values(times)[0], simulated.vibration(times)[0, 0]
+    measured = channel.slope * raw + channel.offset
+    assert measured == pytest.approx(truth * STANDARD_GRAVITY, abs=channel.slope)
+    assert host.heard.warnings == []
+
+
+def test_the_sensors_own_factors_are_doubted_with_another_reference_voltage(connect):
+    host, *_ = connect()
+    host.bus.write(host.sensor, {"adc.reference_voltage": 5.0})
+    assert host.heard.warnings == [
+        "channel x: the device's factors are made for a reference voltage of 3.3 V, not for 5 V; "
+        "correct them or set calibration_source to range; using the device's factors"]
 
 
 def test_the_sensors_own_calibration_is_used_where_that_is_wanted_even_if_implausible(
