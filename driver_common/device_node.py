@@ -336,7 +336,7 @@ class DeviceNode(LifecycleNode):
 
     def on_found(self, device: Any) -> None:
         """Show the device's settings as parameters."""
-        self._note_link_works()
+        self._note_news()
         self.get_logger().info(f"{device.title}: connected to {self.describe(device)}")
         self.show_settings(device.options.name, device)
 
@@ -346,7 +346,7 @@ class DeviceNode(LifecycleNode):
 
     def on_lost(self, device: Any, error: DriverError) -> None:
         """Log why there is no device."""
-        self._note_link_works()
+        self._note_news()
         self.get_logger().error(f"{device.title}: {error} (waiting for it)")
 
     def on_note(self, device: Any, text: str, *, warning: bool = False) -> None:
@@ -366,6 +366,11 @@ class DeviceNode(LifecycleNode):
         if str(error) != str(self._bus_error):
             self.get_logger().error(f"{error} (waiting for it)")
         self._bus_error = error
+
+    def _note_news(self) -> None:
+        """A device tells something: so the link works, and the diagnostics are to show it."""
+        self._note_link_works()
+        self._statuses_due = 0.0
 
     def _note_link_works(self) -> None:
         if self._bus_error is not None:
@@ -433,7 +438,7 @@ class DeviceNode(LifecycleNode):
         now = time.monotonic()
         if now + pause < self._statuses_due:
             return
-        self._statuses_due = now + diagnostics.PERIOD / 4
+        self._statuses_due = now + 0.9 * diagnostics.PERIOD
         try:
             self._statuses = [self.status_of(device) for device in self.bus.devices]
         except Exception as error:  # it must not disturb the bus

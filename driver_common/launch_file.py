@@ -8,6 +8,7 @@ from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
 PACKAGE = "industrial_sensor_drivers"
@@ -26,7 +27,8 @@ def describe_driver(executable: str, name: str, link: Mapping[str, str]) -> Laun
     """
     def make_node(context: LaunchContext) -> list[Node]:
         values = {key: LaunchConfiguration(key).perform(context) for key in link}
-        given = {key: value for key, value in values.items() if value}
+        given = {key: ParameterValue(value, value_type=str)  # also where it looks like a number
+                 for key, value in values.items() if value}
         return [Node(
             package=PACKAGE, executable=executable, output="screen",
             name=LaunchConfiguration("name"), namespace=LaunchConfiguration("namespace"),

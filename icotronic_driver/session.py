@@ -173,7 +173,7 @@ class IcotronicBus(DeviceBus[Sensor]):
         sensor, before = self.sensor, self.sensor.values
         sensor.read_all(_Access(self.line), SETTINGS, self._note)
         changed = {name: value for name, value in sensor.values.items()
-                   if value != before.get(name)}
+                   if value != before.get(name) and value == value}  # NaN is no change
         sensor.options.wanted |= changed
         sensor.unsaved |= changed.keys()
         self._choose_calibrations()
@@ -239,6 +239,8 @@ class IcotronicBus(DeviceBus[Sensor]):
         return changes
 
     def _save_field(self, field: Field, value: FieldValue) -> None:
+        if field.name.endswith("Slope") and not value:
+            raise SettingError("a slope of 0 would make every measurement the same")
         self._write_field(field, value)
         stored = self._read_field(STH_1, field)
         if _raw(field, stored) != field.encode(value):

@@ -31,6 +31,7 @@ LOAD_LIMIT, LOAD_MAXIMUM = 0.4, 0.6  # with stuff bits, without (section 9.2.10)
 
 _HEAD = 2  # format and counter
 _MAX_DELAY = 0.25  # s; nothing on the way holds frames back for longer
+_MAX_BACKLOG = 10.0  # s; no more frames than that wait for a busy host
 _SETTLED = 64  # frames by which a stream that catches up comes nearer within a turn, at least
 
 
@@ -370,8 +371,10 @@ class StreamDecoder:
         if self.number < 0:
             return 1
         silence = arrival - self._arrival
-        if seen is not None and self._seen is not None:  # else it may be a clock that was set
-            silence = min(silence, (seen - self._seen) * 1e-9)
+        if seen is not None and self._seen is not None:
+            waited = (seen - self._seen) * 1e-9
+            if silence > waited + _MAX_BACKLOG:  # the clock was set
+                silence = waited
         if step == 0 and data != self._last and self._frame_rate:
             step = COUNTER_TURN  # it is none that came again
         turns = max(0, round((silence * self._frame_rate - step) / COUNTER_TURN))

@@ -14,6 +14,7 @@ import time
 
 import can
 import pytest
+from bus_master import needs_errors_of_socketcand
 
 from driver_common import can_link
 from driver_common.can_link import CanLink, parse_options
@@ -415,6 +416,7 @@ def test_another_server_is_not_taken_for_socketcand(tcp_server, greeting):
         open_link("socketcand", options=tcp_server(greeting))
 
 
+@needs_errors_of_socketcand
 def test_a_channel_that_the_server_does_not_have_is_an_error(server):
     with pytest.raises(LinkError, match=r"cannot open socketcand can7: .*could not open bus"):
         open_link("socketcand", "can7", at(server))

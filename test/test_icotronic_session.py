@@ -15,7 +15,7 @@ from types import SimpleNamespace
 import can
 import numpy as np
 import pytest
-from bus_master import BusMaster, BusRecorder, wait_until
+from bus_master import BusMaster, BusRecorder, needs_errors_of_socketcand, wait_until
 
 from driver_common import can_link, sample_clock, simulated_bus
 from driver_common.device_thread import DeviceThread
@@ -575,6 +575,7 @@ def test_a_server_that_goes_and_comes_back_is_noticed_and_opened_again(start, se
         again.close()
 
 
+@needs_errors_of_socketcand
 def test_bus_off_is_an_error_that_says_what_to_do_and_the_bus_is_opened_again(start, serve):
     server = start()
     service = serve(server)
@@ -917,6 +918,7 @@ def test_a_wrong_number_of_sensors_does_not_end_the_search(
     host.find()
 
 
+@needs_errors_of_socketcand
 def test_error_frames_are_counted(connect):
     host, network, _ = connect()
     host.stream()

@@ -132,7 +132,7 @@ def _run(numbers: list[int], rate: float = 3175.0) -> StreamDecoder:
     return decoder
 
 
-@pytest.mark.parametrize("jump", [0.3, 3600.0, -3600.0])
+@pytest.mark.parametrize("jump", [3600.0, 1.8e9, -3600.0])
 def test_a_clock_that_is_set_is_no_loss(jump: float) -> None:
     decoder = StreamDecoder(StreamFormat(X, 3), 3175.0)
     for number in range(2000):
@@ -147,6 +147,17 @@ def test_an_outage_of_whole_turns_is_seen_by_both_clocks() -> None:
         time = number / 3175.0
         decoder.decode_frame(time, _frame(number), round(time * 1e9))
     assert (decoder.statistics.lost, decoder.number) == (10 * 256, 4999)
+
+
+def test_frames_that_got_lost_while_the_host_was_busy_are_counted() -> None:
+    decoder = StreamDecoder(StreamFormat(X, 3), 3175.0)
+    kept, lost = 635, 2540  # the host is away for 1 s, and the kernel keeps the first 0.2 s
+    back = round((1000 + kept + lost) / 3175.0 * 1e9)
+    for number in (*range(1000 + kept), *range(1000 + kept + lost, 8000)):
+        arrival = number / 3175.0
+        seen = max(back, round(arrival * 1e9)) if number >= 1000 else round(arrival * 1e9)
+        decoder.decode_frame(arrival, _frame(number), seen)
+    assert (decoder.statistics.lost, decoder.number) == (lost, 7999)
 
 
 @pytest.mark.parametrize("first", [0, 1, 2, 200, 255])

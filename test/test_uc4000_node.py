@@ -370,6 +370,13 @@ def test_diagnostics_of_a_sensor_that_is_silent(simulated, uc4000, heard, ros):
     ros.wait_for_status("uc4000: right", lambda status: status.level != ERROR)
 
 
+def test_a_new_rate_counts_at_once(simulated, uc4000, heard):
+    assert uc4000.set("right.rate", 0.02).successful  # a measurement in 50 s
+    heard.next("right/range")
+    assert uc4000.set("right.rate", 5.0).successful
+    heard.several("right/range", 3)
+
+
 def test_one_sensor_can_be_stopped_and_started(simulated, uc4000, heard, ros):
     assert uc4000.trigger("right/stop_acquisition").success
     ros.wait_for_status("uc4000: right", lambda status: "stopped" in status.message)

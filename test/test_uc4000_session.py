@@ -534,12 +534,32 @@ def test_a_sensor_at_another_address(connect):
         "correct the parameter address")
 
 
-def test_several_sensors_where_one_is_expected(connect):
-    line, _ = connect(3, 5)
+@pytest.mark.parametrize("addresses", [(3, 5), (1, 3), (2, 7), (5, 7), (2, 3, 6)], ids=str)
+def test_several_sensors_where_one_is_expected(connect, addresses):
+    line, _ = connect(*addresses)  # the answers of some pairs together look like that of one
     error = connect.master(line, Options()).lose()
     assert isinstance(error, WrongDeviceError)
-    assert str(error) == ("several sensors answer (3, 5); say which one with the parameter "
-                          "address, or name all of them with the parameter sensors")
+    assert str(error) == (
+        f"several sensors answer ({', '.join(map(str, addresses))}); say which one with the "
+        "parameter address, or name all of them with the parameter sensors")
+
+
+def test_what_looks_like_a_reply_before_anything_was_measured_shifts_nothing(connect):
+    line, _ = connect(1, 2)
+    master = connect.master(line, *named(1, 2)).find()
+    receive = line._device.receive
+
+    def receive_with_noise(data, now):
+        line._device.receive = receive
+        return [(now + 0.010, bytes.fromhex("23 D1")), *receive(data, now)]  # a distance
+
+    master.measure(4)
+    line._device.receive = receive_with_noise
+    start = len(master.heard.measurements)
+    master.measure(6)
+    for name, measurement in master.heard.measurements[start:]:
+        assert measurement.distance.value == still(int(name[1:]) - 1)
+    assert sum(sensor.statistics.damaged for sensor in master.bus.devices) == 1
 
 
 def test_another_device(connect):

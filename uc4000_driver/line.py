@@ -52,6 +52,7 @@ REQUEST_TIME = REQUEST_LENGTH * BYTE_TIME
 GROUP_LATENCY = 0.008  # s, allowance for adapters and the host; more would leave fewer sensors
 REPLY_WINDOW = REPLY_SPREAD + SHORT_REPLY * BYTE_TIME + GROUP_LATENCY
 STAGGER = REPLY_WINDOW + GAP
+SHORTEST = 0.4  # of a measurement's usual time; sound needs as much for 4 m and back
 
 ECHO_CHOICES = {"auto": None, "on": True, "off": False}
 
@@ -231,8 +232,7 @@ class Line:
         self._receive_all(time.monotonic() + REQUEST_TIME + timeout + LATENCY, parser)
         try:
             self._check(parser, who)
-            if len(ends) > 1:
-                self._check_order(parser, ends, who)
+            self._check_times(parser, ends, command.duration, who)
         except DriverError:
             self._late.add(command.reply_length)
             self._late_until = time.monotonic() + command.duration
@@ -284,8 +284,18 @@ class Line:
         raise NoAnswerError(f"no answer from {who} on {self.port}{hint}")
 
     @staticmethod
-    def _check_order(parser: ReplyParser, ends: Sequence[float], who: str) -> None:
-        """Raise where it is not certain that the replies are in the order of the requests."""
+    def _check_times(parser: ReplyParser, ends: Sequence[float], duration: float,
+                     who: str) -> None:
+        """Raise where it is not certain which reply belongs to which request.
+
+        A distance takes its time: what looks like one before is noise, or an older one. Of several,
+        all have to come in the order of the requests.
+        """
+        if any(reply.acknowledged and arrived < end - duration * (1 - SHORTEST)
+               for reply, arrived, end in zip(parser.replies, parser.times, ends, strict=True)):
+            raise FrameError(f"a reply from {who} that came too early to be measured")
+        if len(ends) == 1:
+            return
         if parser.damaged or any(arrived > end + REPLY_WINDOW
                                  for arrived, end in zip(parser.times, ends, strict=True)):
             raise FrameError(f"damaged or late replies from {who}")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 from math import pi
 from typing import Any
 
@@ -107,11 +109,17 @@ class Uc4000Node(DeviceNode, Listener):
         options.temperature_period = self.option("temperature_period", options.name)
 
     def apply_options(self) -> None:
-        """Hand live options to the bus."""
-        if self.bus is not None:
-            self.bus.line.local_echo = self.option("local_echo")
-            for sensor in self.bus.devices:
-                self._set_live(sensor.options)
+        """Hand live options to the bus; they count from the next measurement on."""
+        if self.bus is not None and self.thread is not None:
+            self.thread.post(partial(self._apply_options, self.bus))
+
+    def _apply_options(self, bus: Uc4000Bus) -> None:
+        bus.line.local_echo = self.option("local_echo")
+        for sensor in bus.devices:
+            before = replace(sensor.options)
+            self._set_live(sensor.options)
+            if sensor.is_connected and sensor.options != before:
+                sensor.due = sensor.temperature_due = 0.0  # not after the period of before
 
     def make_interfaces(self, sensor: str) -> None:
         """Create topics and services of a sensor."""

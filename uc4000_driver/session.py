@@ -339,15 +339,23 @@ class Uc4000Bus(DeviceBus[Sensor]):
     def _ask_address(self) -> int:
         """Ask for the address by cast; one sensor on the wire may answer (section 5.1.6.3)."""
         try:
-            return self.line.ask(CAST, commands.ASK_ADDRESS, "any sensor")[0]
+            address = self.line.ask(CAST, commands.ASK_ADDRESS, "any sensor")[0]
         except FrameError:
-            found = [address for address in range(FIRST_ADDRESS, LAST_ADDRESS + 1)
-                     if self._answers_at(address, attempts=1)]
+            found = self._answering(range(FIRST_ADDRESS, LAST_ADDRESS + 1))
             if len(found) < 2:
                 raise
-            raise WrongDeviceError(
-                f"several sensors answer ({', '.join(map(str, found))}); say which one with the "
-                "parameter address, or name all of them with the parameter sensors") from None
+        else:  # the wire carries a 1 only where all send one: others may hide behind the answer
+            found = self._answering(other for other in range(address + 1, LAST_ADDRESS + 1)
+                                    if other & address == address)
+            if not found:
+                return address
+            found = [*self._answering([address]), *found]
+        raise WrongDeviceError(
+            f"several sensors answer ({', '.join(map(str, found))}); say which one with the "
+            "parameter address, or name all of them with the parameter sensors") from None
+
+    def _answering(self, addresses: Iterable[int]) -> list[int]:
+        return [address for address in addresses if self._answers_at(address, attempts=1)]
 
     def _answers_at(self, address: int, attempts: int = ATTEMPTS) -> bool:
         """Whether something answers there."""
