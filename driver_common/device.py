@@ -118,12 +118,16 @@ class Device:
     def write(self, access: RecordAccess, changes: Mapping[str, Value]) -> dict[str, Value]:
         """Write settings, all or none, and return what the device reports; see `write_settings`."""
         reported = write_settings(access, self.settings, changes)
-        self.unsaved |= {name for name in changes if reported[name] != self.values.get(name)}
-        self.options.wanted |= reported
-        self.values |= reported
-        for name in changes:
-            self.differing.pop(name, None)
+        self.take_over(reported)
         return reported
+
+    def take_over(self, values: Mapping[str, Value]) -> None:
+        """Take note of reported values that were changed on purpose: they are wanted now."""
+        self.unsaved |= {name for name in values if values[name] != self.values.get(name)}
+        self.options.wanted |= values
+        self.values |= values
+        for name in values:
+            self.differing.pop(name, None)
 
     def make_as_wanted(self, write: Callable[[Mapping[str, Value]], object], note: Note) -> None:
         """Compare with what is wanted; where it differs write, warn or do nothing.

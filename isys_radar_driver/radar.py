@@ -156,14 +156,6 @@ class Radar(Device):
                          if record_of(self.settings[name]).stored_at_once}
         return reported
 
-    def take_over(self, values: Mapping[str, Value]) -> None:
-        """Take note of values that a command changed on purpose, in the RAM."""
-        self.unsaved |= {name for name in values if values[name] != self.values[name]}
-        self.options.wanted |= values
-        self.values |= values
-        for name in values:
-            self.differing.pop(name, None)
-
     @property
     def model(self) -> Model | None:
         """The connected model."""
