@@ -29,7 +29,7 @@ setup(
     ],
     entry_points={
         "console_scripts": [
-            "demo = sensor_tools.demo:main",
+            "demo = sensor_tools.demo.program:main",
             "icotronic_node = icotronic_driver.node:main",
             "isys_radar_node = isys_radar_driver.node:main",
             "simulate = sensor_tools.simulate:main",

@@ -14,12 +14,12 @@ import sys
 import time
 from collections.abc import Callable
 
-from driver_common.simulated_bus import CanFrame
+from driver_common.simulator.bus import CanFrame
 from icotronic_driver.commands import ACCELERATION_DATA, START_ACCELERATION
 from icotronic_driver.identifier import STH_1
 from icotronic_driver.settings import nearest_adc_configuration
-from icotronic_driver.simulated_sth import SimulatedSth
-from icotronic_driver.simulator import SimulatedIcotronic, SimulatedNetwork
+from icotronic_driver.simulator.line import SimulatedIcotronic, SimulatedNetwork
+from icotronic_driver.simulator.sth import SimulatedSth
 from icotronic_driver.streaming import StreamFormat, stream_format
 
 ONE_CHANNEL = stream_format((True, False, False))

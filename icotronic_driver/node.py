@@ -23,7 +23,7 @@ from icotronic_driver.line import Line
 from icotronic_driver.sensor import Options, Phase, Sensor, UnitIdentity
 from icotronic_driver.session import STORED, IcotronicBus, Listener
 from icotronic_driver.settings import SETTINGS
-from icotronic_driver.simulator import simulated_network
+from icotronic_driver.simulator.line import simulated_network
 from icotronic_driver.streaming import AXES
 from icotronic_driver.values import CLOCK, decode_mac, encode_mac
 from msg_conversions.battery import to_battery_state

@@ -21,7 +21,7 @@ from isys_radar_driver.models import find_model
 from isys_radar_driver.radar import Options, Radar
 from isys_radar_driver.session import Listener, RadarBus
 from isys_radar_driver.settings import ALL_SETTINGS
-from isys_radar_driver.simulator import simulated_line
+from isys_radar_driver.simulator.line import simulated_line
 from isys_radar_driver.targets import TargetList
 from msg_conversions.multi_array import to_float32_multi_array
 from msg_conversions.point_cloud import to_point_cloud

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from icotronic_driver.simulator import simulated_network
+from icotronic_driver.simulator.line import simulated_network
 from sensor_tools.simulation import Simulation, add_faults, fault_commands, set_faults, switch
 
 DESCRIPTION = "ICOtronic accelerometers on a CAN bus, served by socketcand"

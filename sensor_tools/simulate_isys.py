@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from isys_radar_driver.models import MODELS
-from isys_radar_driver.simulator import simulated_line
+from isys_radar_driver.simulator.line import simulated_line
 from sensor_tools.simulation import (
     LINE_FAULTS,
     Simulation,

@@ -14,7 +14,7 @@ from sensor_tools.simulation import (
     switch,
 )
 from uc4000_driver.commands import OpCode
-from uc4000_driver.simulator import simulated_line
+from uc4000_driver.simulator.line import simulated_line
 
 DESCRIPTION = "Pepperl+Fuchs UC4000 ultrasonic sensors on one wire"
 

@@ -22,7 +22,7 @@ from uc4000_driver.line import ECHO_CHOICES
 from uc4000_driver.sensor import Measurement, Options, Sensor
 from uc4000_driver.session import OPERATING_TEMPERATURE, Listener, Uc4000Bus
 from uc4000_driver.settings import ALL_SETTINGS
-from uc4000_driver.simulator import simulated_line
+from uc4000_driver.simulator.line import simulated_line
 from uc4000_driver.telegram import BAUD_RATE, LAST_ADDRESS, error_text
 
 SIMULATED = "sim://"

@@ -1,0 +1,1 @@
+"""Transports of simulated devices: a serial line, a CAN bus."""

@@ -1,0 +1,1 @@
+"""The demonstration: simulated sensors and their drivers, recorded and compared with the truth."""

@@ -1,0 +1,287 @@
+"""The demonstration as its user sees it: what it prints, what it leaves, and what it does not."""
+
+import contextlib
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from rosbags.highlevel import AnyReader
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+DEADLINE = 60  # seconds
+TOPICS = {
+    "/isys_radar/points": "sensor_msgs/msg/PointCloud2",
+    "/icotronic/imu/data_raw": "sensor_msgs/msg/Imu",
+    "/uc4000/range": "sensor_msgs/msg/Range",
+    "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
+}
+PROCESSES = 2 * 3  # a simulator and a driver for each family
+PNG = b"\x89PNG\r\n\x1a\n"
+
+
+class Demo:
+    """Runs the demonstration in a directory of its own."""
+
+    def __init__(self, directory):
+        self.directory = directory
+        self.temporary = directory / "tmp"
+        self.temporary.mkdir()
+        self.process = None
+
+    def start(self, *arguments, code="from sensor_tools.demo.program import main"):
+        path = os.pathsep.join(
+            filter(None, (str(ROOT), str(self.directory), os.environ.get("PYTHONPATH")))
+        )
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", f"{code}; import sys; sys.exit(main())", *arguments],
+            cwd=self.directory,
+            env={**os.environ, "TMPDIR": str(self.temporary), "PYTHONPATH": path},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        return self.process
+
+    def run(self, *arguments, **options):
+        self.start(*arguments, **options)
+        output, errors = self.process.communicate(timeout=DEADLINE)
+        return self.process.returncode, output, errors
+
+    def wait_for_line(self, text):
+        for line in self.process.stdout:
+            if text in line:
+                return
+        pytest.fail(f"{text!r} was not printed:\n{self.process.stderr.read()}")
+
+    def children(self):
+        """Command lines of running processes that this demonstration started."""
+        marker = f"TMPDIR={self.temporary}".encode()
+        found = []
+        for process in Path("/proc").glob("[0-9]*"):
+            with contextlib.suppress(OSError):
+                if (int(process.name) != self.process.pid
+                        and marker in (process / "environ").read_bytes().split(b"\0")):
+                    found.append((process / "cmdline").read_bytes().replace(b"\0", b" ").decode())
+        return found
+
+    def assert_nothing_is_left(self):
+        assert self.children() == []
+        assert list(self.temporary.iterdir()) == []
+
+
+@pytest.fixture
+def demo(tmp_path):
+    demo = Demo(tmp_path)
+    yield demo
+    if demo.process is not None:
+        demo.process.kill()
+        demo.process.communicate()
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """A demonstration that ran to its end, with its exit code, output and errors."""
+    demo = Demo(tmp_path_factory.mktemp("demo"))
+    return demo, *demo.run("--duration", "4", "--bag", "recording")
+
+
+def summary(output):
+    """Return type and count of each topic, from the last lines of the output."""
+    rows = re.findall(r"^(/\S+) +(\S+) +(\d+) messages +[\d.]+ per second$", output, re.MULTILINE)
+    return {name: (kind, int(count)) for name, kind, count in rows}
+
+
+def recorded(bag):
+    """Return type and count of each topic in a bag, after reading every message."""
+    with AnyReader([bag]) as reader:
+        counts = dict.fromkeys(reader.topics, 0)
+        for connection, stamp, data in reader.messages():
+            message = reader.deserialize(data, connection.msgtype)
+            sent = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
+            assert 0 <= 1e-9 * stamp - sent < 1  # recorded as it came
+            counts[connection.topic] += 1
+        return {name: (reader.topics[name].msgtype, count) for name, count in counts.items()}
+
+
+def test_it_succeeds_and_says_what_came(finished):
+    _, code, output, errors = finished
+    assert (code, errors) == (0, "")
+    counts = summary("\n".join(output.splitlines()[-len(TOPICS):]))
+    assert {name: kind for name, (kind, _) in counts.items()} == TOPICS
+    assert counts["/isys_radar/points"][1] == pytest.approx(4 / 0.075, abs=9)
+    assert counts["/icotronic/imu/data_raw"][1] == pytest.approx(4 * 9523.8, rel=0.15)
+    assert counts["/uc4000/range"][1] == pytest.approx(4 * 10, abs=7)
+    assert re.search(r"(\d+) of \1 values are as near to the truth", output)
+
+
+def test_the_bag_holds_what_came(finished):
+    demo, _, output, _ = finished
+    assert recorded(demo.directory / "recording") == summary(output)
+
+
+def test_the_bag_is_one_of_jazzy(finished):
+    demo, *_ = finished
+    with AnyReader([demo.directory / "recording"]) as reader:
+        digests = {connection.msgtype: connection.digest for connection in reader.connections}
+    metadata = (demo.directory / "recording" / "metadata.yaml").read_text()
+    assert "version: 9" in metadata
+    assert "storage_identifier: mcap" in metadata
+    # As printed by "ros2 topic info --verbose".
+    assert digests["sensor_msgs/msg/PointCloud2"] == (
+        "RIHS01_9198cabf7da3796ae6fe19c4cb3bdd3525492988c70522628af5daa124bae2b5"
+    )
+
+
+def test_there_is_a_picture(finished):
+    demo, *_ = finished
+    picture = demo.directory / "recording" / "picture.png"
+    assert picture.read_bytes().startswith(PNG)
+    assert picture.stat().st_size > 20_000
+
+
+def test_nothing_else_is_left(finished):
+    demo, *_ = finished
+    demo.assert_nothing_is_left()
+    assert {path.name for path in demo.directory.iterdir()} == {"tmp", "recording"}
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_with_what_it_has(demo, number):
+    process = demo.start("--duration", "60", "--bag", "recording")
+    demo.wait_for_line("2 of 60 s")
+    assert len(demo.children()) == PROCESSES
+    process.send_signal(number)
+    output, errors = process.communicate(timeout=DEADLINE)
+    assert (process.returncode, errors) == (128 + number, "")
+    assert recorded(demo.directory / "recording") == summary(output)
+    demo.assert_nothing_is_left()
+
+
+def test_a_signal_before_the_first_message_leaves_nothing(demo):
+    process = demo.start("--bag", "recording")
+    demo.wait_for_line("Started")
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=DEADLINE)
+    assert (process.returncode, errors) == (130, "")
+    demo.assert_nothing_is_left()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a child is not told")
+def test_when_it_is_killed_its_processes_end(demo):
+    process = demo.start("--duration", "60", "--bag", "recording")
+    demo.wait_for_line("1 of 60 s")
+    process.kill()
+    deadline = time.monotonic() + DEADLINE
+    while demo.children() and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert demo.children() == []
+
+
+@pytest.mark.parametrize(
+    ("bag", "message"),
+    [
+        ("tmp", "error: tmp exists already; name another directory with --bag\n"),
+        ("file/bag", "error: cannot make the bag file/bag: Not a directory\n"),
+    ],
+)
+def test_a_bag_that_cannot_be_made_is_said_in_one_line(demo, bag, message):
+    (demo.directory / "file").touch()
+    assert demo.run("--bag", bag) == (1, "", message)
+    demo.assert_nothing_is_left()
+
+
+FAMILY = """
+import dataclasses, numpy
+from sensor_tools import demo
+from sensor_tools.demo.families import FAMILIES, Comparison, Program, Topic
+
+def compare(messages):
+    numbers = numpy.array([message.linear_acceleration.x for message in messages])
+    losses = numpy.abs(numpy.diff(numbers, prepend=numbers[0] - 1) - 1)
+    times = numpy.arange(numbers.size, dtype=float)
+    return Comparison("number [1]", "losses [1]", seconds=times, tracks=times.astype(int) * 0,
+                      names=["x"], measured=numbers, errors=losses, tolerances=times * 0,
+                      curve_seconds=times, curves=numbers[:, None])
+
+def main():
+    family = dataclasses.replace(
+        FAMILIES[0], name="fake", simulator=Program("fake", ("simulator", "{port}")),
+        node=Program("fake", ("driver",)), compare=compare, panels=FAMILIES[0].panels[1:],
+        topics=(Topic("/fake", "sensor_msgs/msg/Imu", 9524.0),))
+    return demo.main(families=[family])
+"""
+DRIVER = """
+import signal, sys, time
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from sensor_msgs.msg import Imu
+
+def main():
+    if sys.argv[1] == "simulator":
+        signal.pause()
+    rclpy.init()
+    node = rclpy.create_node("fake")
+    publisher = node.create_publisher(Imu, "/fake", 5000)
+    diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+    start, count = time.monotonic(), 0
+    while rclpy.ok():
+        while count < (time.monotonic() - start) * 9524:
+            if count % 4000 == 0:
+                diagnostics.publish(DiagnosticArray())
+            publisher.publish(Imu())
+            count += 1
+        time.sleep(0.005)
+"""
+
+
+@pytest.fixture
+def fake(demo):
+    """A demonstration of a sensor whose driver is `DRIVER`, changed as the test likes."""
+
+    def run(old="", new=""):
+        (demo.directory / "fake.py").write_text(DRIVER.replace(old, new))
+        (demo.directory / "family.py").write_text(FAMILY)
+        return demo.run("--duration", "3", code="from family import main")
+
+    return run
+
+
+def test_ten_thousand_messages_a_second_come_without_loss(fake, demo):
+    number = "Imu(linear_acceleration=Vector3(x=float(count)))"
+    code, output, errors = fake(
+        "publisher.publish(Imu())",
+        f"from geometry_msgs.msg import Vector3; publisher.publish({number})",
+    )
+    assert (code, errors) == (0, "")
+    assert summary(output)["/fake"][1] == pytest.approx(3 * 9524, rel=0.1)
+    assert re.search(r"fake: (\d+) of \1 values", output)
+    demo.assert_nothing_is_left()
+
+
+def test_a_driver_that_ends_is_named_with_its_last_lines(fake, demo):
+    code, _, errors = fake("    rclpy.init()", "    sys.exit('no sensor today')")
+    assert code == 1
+    assert errors == "error: the fake driver has ended; its last lines:\n    no sensor today\n"
+    assert [path.name for path in (demo.directory / "demo_output").iterdir()] == [".gitignore"]
+    demo.assert_nothing_is_left()
+
+
+def test_a_driver_that_is_too_slow_is_named(fake, demo):
+    code, output, errors = fake("* 9524", "* 5000")
+    assert code == 1
+    had, due = re.match(r"error: /fake had (\d+) messages instead of (\d+)\n", errors).groups()
+    assert 0.4 < int(had) / int(due) < 0.6
+    assert "last lines of the fake driver" in errors
+    assert "/fake" in summary(output)
+    demo.assert_nothing_is_left()
+
+
+def test_wrong_measurements_are_named(fake):
+    code, _, errors = fake()
+    assert code == 1
+    assert errors == "error: the measurements of the fake do not agree with the truth\n"

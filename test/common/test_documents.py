@@ -1,0 +1,126 @@
+"""Files beside the code: they fit the tables of the drivers, and the programs that read them."""
+
+import re
+import runpy
+from pathlib import Path
+
+import pytest
+import yaml
+
+from sensor_tools import document
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+PARAMETER_FILES = [
+    path for path in sorted((ROOT / "config").glob("*.yaml"))
+    if "ros__parameters" in path.read_text()
+]
+DRIVERS = {driver.name: driver for driver in document.DRIVERS}
+
+
+def parameters(text):
+    """Return what a parameter file says, and to which node."""
+    ((node, content),) = yaml.safe_load(text).items()
+    assert node == "/**"
+    assert list(content) == ["ros__parameters"]
+    return content["ros__parameters"]
+
+
+def driver_of(path):
+    """Return the driver whose name the file begins with, in the singular or the plural."""
+    return next(d for name, d in DRIVERS.items() if path.stem.replace("radars", "radar", 1)
+                .startswith(name))
+
+
+def rows(driver):
+    """Return all rows of a driver by name."""
+    options = {option.name: option for option in driver.options}
+    return {**driver.node.ALL_SETTINGS, **options}
+
+
+def test_they_are_up_to_date(capsys):
+    assert document.main(["--check"]) == 0, capsys.readouterr().out
+
+
+def test_a_stale_one_is_named(monkeypatch, capsys):
+    monkeypatch.setattr(document, "documents", lambda: {ROOT / "README.rst": "?"})
+    assert document.main(["--check"]) == 1
+    assert capsys.readouterr().out == (
+        "README.rst is stale\nRun 'python -m sensor_tools.document'.\n"
+    )
+
+
+@pytest.mark.parametrize("path", PARAMETER_FILES, ids=lambda path: path.name)
+def test_a_parameter_file_holds_what_the_driver_has(path):
+    values = parameters(path.read_text())
+    known = rows(driver_of(path))
+    for name, value in values.items():
+        sensor, _, rest = name.partition(".")
+        row = known[rest if sensor in values.get("sensors", ()) else name]
+        assert type(value) is row.kind, name
+        row.check(value)
+
+
+@pytest.mark.parametrize("driver", DRIVERS.values(), ids=DRIVERS)
+def test_every_line_of_a_made_file_may_be_used(driver):
+    text = re.sub(r"^    # ([a-z0-9_.]+:) ", r"    \1 ", document.parameter_file(driver),
+                  flags=re.MULTILINE)
+    values = parameters(text)
+    settings = {name for name in driver.node.ALL_SETTINGS if driver.variants(name)}
+    assert set(values) == settings | {option.name for option in driver.options}
+    for name, value in values.items():
+        for row in driver.variants(name).values() or [rows(driver)[name]]:
+            assert type(value) is row.kind, name
+            assert row.check(value) == value, name
+
+
+@pytest.mark.parametrize("driver", DRIVERS.values(), ids=DRIVERS)
+def test_every_setting_is_listed(driver):
+    listed = set()
+    for name, numbers in re.findall(r"^\| `([\w.]+)`(?:, N = ([\d, ]+))? \|",
+                                    document.table(driver), re.MULTILINE):
+        listed |= {name.replace("N", number) for number in numbers.split(", ")}
+    assert listed == set(rows(driver))
+
+
+@pytest.mark.parametrize(
+    ("rows_", "text"),
+    [
+        (("output1.range_min", "output3.range_min"), "`outputN.range_min`, N = 1, 2, 3"),
+        (("output1.temperature_threshold_celsius",), "`output1.temperature_threshold_celsius`"),
+    ],
+)
+def test_settings_that_differ_by_a_number_share_a_line(rows_, text):
+    lines = [line for line in document.table(DRIVERS["isys_radar"]).splitlines() if text in line]
+    assert len(lines) == 1
+    assert all(name in DRIVERS["isys_radar"].node.ALL_SETTINGS for name in rows_)
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "launch").glob("*.py")), ids=lambda p: p.name)
+def test_launch_files_start_what_there_is(path):
+    text = path.read_text()
+    compile(text, str(path), "exec")
+    ((program, name),) = re.findall(r'describe_driver\("(\w+)", "(\w+)"', text)
+    assert f'"{program} = ' in (ROOT / "setup.py").read_text()
+    assert (ROOT / "config" / f"{name}.yaml").exists()
+    assert path.name == f"{name}.launch.py"
+
+
+@pytest.mark.parametrize(("name", "link"), [
+    ("isys_radar", {"serial_port"}), ("uc4000", {"serial_port"}),
+    ("icotronic", {"can_interface", "can_channel"})])
+def test_launch_files_have_arguments(name, link):
+    pytest.importorskip("launch_ros.actions", reason="launch comes with a sourced ROS only")
+    content = runpy.run_path(str(ROOT / "launch" / f"{name}.launch.py"))
+    arguments = content["generate_launch_description"]().get_launch_arguments()
+    assert {argument.name for argument in arguments} == {
+        "params_file", "namespace", "name", *link}
+
+
+def test_rviz_shows_the_points_of_the_radar():
+    text = yaml.safe_load((ROOT / "rviz" / "isys_radar.rviz").read_text())
+    manager = text["Visualization Manager"]
+    (cloud,) = (display for display in manager["Displays"]
+                if display["Class"].endswith("PointCloud2"))
+    assert cloud["Topic"]["Value"] == "/isys_radar/points"
+    assert cloud["Channel Name"] == "radial_velocity"
+    assert manager["Global Options"]["Fixed Frame"] == "isys_radar_link"

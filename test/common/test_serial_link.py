@@ -1,0 +1,257 @@
+"""A serial port on a real pseudo-terminal or TCP: bytes in and out, and errors in words."""
+
+from __future__ import annotations
+
+import os
+import socket
+import stat
+import threading
+import time
+import tty
+
+import pytest
+
+from driver_common.errors import LinkError
+from driver_common.serial_link import SerialLink
+from driver_common.simulator.line import SPEEDS, SimulatedLine
+
+DEADLINE = 10.0  # s
+
+
+class Terminal:
+    """A pseudo-terminal; `path` is the serial port, `master` the other end of the cable."""
+
+    def __init__(self):
+        self.master, self._slave = os.openpty()
+        tty.setraw(self._slave)
+        self.path = os.ttyname(self._slave)
+        self._plugged = True
+
+    def write(self, data):
+        os.write(self.master, data)
+
+    def read(self):
+        return os.read(self.master, 4096)
+
+    def speed(self):
+        return SPEEDS[tty.tcgetattr(self.master)[5]]
+
+    def unplug(self):
+        if self._plugged:
+            self._plugged = False
+            os.close(self.master)
+            os.close(self._slave)
+
+
+@pytest.fixture
+def terminal():
+    terminal = Terminal()
+    yield terminal
+    terminal.unplug()
+
+
+@pytest.fixture
+def link(terminal):
+    link = SerialLink(terminal.path, 115200)
+    yield link
+    link.close()
+
+
+def read_all(link, count, timeout=DEADLINE):
+    data = b""
+    while len(data) < count:
+        more = link.read(timeout)
+        assert more
+        data += more
+    return data
+
+
+def error_of(port, baud_rate=115200):
+    with pytest.raises(LinkError) as caught:
+        SerialLink(port, baud_rate)
+    return str(caught.value)
+
+
+def test_a_host_that_was_held_up_waits_once_more(terminal, link, monkeypatch):
+    real = time.monotonic
+    times = iter([real()])  # the wait of 10 ms seems to take 5 s more
+    monkeypatch.setattr(time, "monotonic", lambda: next(times, None) or real() + 5.0)
+    late = threading.Timer(0.1, terminal.write, [b"late"])
+    late.start()
+    assert read_all(link, 4, timeout=0.01) == b"late"
+    late.join()
+
+
+def test_bytes_go_out_and_come_in_unchanged(terminal, link):
+    everything = bytes(range(256))
+    link.write(everything)
+    assert terminal.read() == everything
+    terminal.write(everything)
+    assert read_all(link, 256) == everything
+
+
+def test_a_read_waits_for_the_first_byte(terminal, link):
+    timer = threading.Timer(0.05, terminal.write, [b"late"])
+    timer.start()
+    assert link.read(DEADLINE)[:1] == b"l"
+    timer.join()
+
+
+def test_a_read_that_is_not_to_wait_gives_what_is_there(terminal, link):
+    assert link.read(0) == b""
+    terminal.write(b"now")
+    assert link.read(DEADLINE) == b"now"
+    assert link.read(0) == b""
+
+
+def test_a_read_gives_up_after_its_time(link):
+    assert link.read(0.01) == b""
+    assert link.read(-1.0) == b""
+
+
+def test_what_arrived_before_the_port_was_opened_is_not_read(terminal):
+    terminal.write(b"old")
+    link = SerialLink(terminal.path, 115200)
+    assert link.read(0.05) == b""
+    link.close()
+
+
+def test_the_baud_rate_is_set_and_can_change(terminal, link):
+    assert (link.baud_rate, terminal.speed()) == (115200, 115200)
+    link.baud_rate = 9600
+    assert (link.baud_rate, terminal.speed()) == (9600, 9600)
+
+
+def test_the_time_of_bytes_on_the_line(link):
+    assert link.seconds(115200) == pytest.approx(10.0)
+    link.baud_rate = 9600
+    assert link.seconds(96) == pytest.approx(0.1)
+
+
+def test_a_port_is_opened_for_one_program_alone(terminal, link):
+    error = error_of(terminal.path)
+    assert f"cannot open {terminal.path}: it is in use by another program" in error
+    assert f"fuser -v {terminal.path}" in error
+    link.close()
+    SerialLink(terminal.path, 115200).close()
+
+
+@pytest.mark.parametrize(("port", "words"), [
+    ("", "serial_port is not set; give a device path"),
+    ("/dev/ttyMissing", "cannot open /dev/ttyMissing: there is no such port"),
+    ("/dev/null", "cannot open /dev/null: that is no serial port"),
+    ("/tmp", "cannot open /tmp: that is no serial port"),
+    ("socket://127.0.0.1:1", "nothing listens there; check host and port"),
+    ("socket://no.such.host.invalid:1", "there is no such host; check its name"),
+    ("socket://127.0.0.1", "a host and a port are needed, as in socket://host:port"),
+    ("socket://127.0.0.1:port", "a host and a port are needed, as in socket://host:port"),
+    ("sucket://127.0.0.1:1", "invalid URL, protocol 'sucket' not known"),
+])
+def test_a_port_that_cannot_be_opened_is_named_with_the_reason(port, words):
+    error = error_of(port)
+    assert words in error
+    assert port in error
+
+
+def test_a_port_without_permission_is_named_with_the_way_out(terminal):
+    mode = stat.S_IMODE(os.stat(terminal.path).st_mode)
+    os.chmod(terminal.path, 0)
+    root = os.geteuid() == 0
+    if root:
+        os.seteuid(65534)  # nobody; root may open everything
+    try:
+        error = error_of(terminal.path)
+    finally:
+        if root:
+            os.seteuid(0)
+        os.chmod(terminal.path, mode)
+    assert f"cannot open {terminal.path}: no permission" in error
+    assert "sudo usermod -aG dialout $USER" in error
+
+
+@pytest.mark.parametrize("action", [
+    lambda link: link.read(DEADLINE), lambda link: link.write(b"?"),
+    lambda link: setattr(link, "baud_rate", 9600)], ids=["read", "write", "baud_rate"])
+def test_a_port_that_is_unplugged_is_named(terminal, link, action):
+    terminal.unplug()
+    with pytest.raises(LinkError, match=f"lost {terminal.path}: .*(unplugged|gone)"):
+        action(link)
+
+
+def test_a_read_ends_when_the_port_is_unplugged(terminal, link):
+    timer = threading.Timer(0.05, terminal.unplug)
+    timer.start()
+    with pytest.raises(LinkError, match=f"lost {terminal.path}"):
+        link.read(DEADLINE)
+    timer.join()
+
+
+def test_a_port_that_is_gone_can_be_closed(terminal, link):
+    terminal.unplug()
+    link.close()
+    link.close()
+    with pytest.raises(LinkError, match=f"lost {terminal.path}"):
+        link.read(0)
+
+
+def test_a_port_that_takes_no_bytes_is_named(link, terminal):
+    with pytest.raises(LinkError, match=f"{terminal.path} takes no bytes; is flow control on"):
+        link.write(bytes(1_000_000))  # nobody reads
+
+
+def test_a_tcp_port_is_a_link_as_well():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        link = SerialLink(f"socket://127.0.0.1:{server.getsockname()[1]}", 115200)
+        peer = server.accept()[0]
+        link.write(b"ping")
+        assert peer.recv(4) == b"ping"
+        peer.sendall(b"pong")
+        assert read_all(link, 4) == b"pong"
+        assert link.read(0.01) == b""
+        link.baud_rate = 9600
+        peer.close()
+        with pytest.raises(LinkError, match=r"lost socket://127\.0\.0\.1"):
+            link.read(DEADLINE)
+        link.close()
+
+
+class Device:
+    """A device that answers the bytes of each request backwards."""
+
+    baud_rate = 115200
+
+    def __init__(self):
+        self.heard = []
+
+    def receive(self, data, now):
+        self.heard.append(data)
+        return [(now, data[::-1])]
+
+
+def test_a_simulated_line_answers_at_its_baud_rate_alone():
+    device = Device()
+    line = SimulatedLine(device).start()
+    link = SerialLink(line.port, 115200)
+    link.write(b"abc")
+    assert read_all(link, 3) == b"cba"
+    link.baud_rate = 9600
+    link.write(b"abc")
+    read_all(link, 3)
+    assert device.heard[0] == b"abc"
+    assert device.heard[-1] != b"abc"
+    link.close()
+    line.close()
+
+
+def test_a_simulated_line_that_was_closed_leaves_later_ones_alone(tmp_path):
+    path = str(tmp_path / "port")
+    first = SimulatedLine(Device(), link=path).start()
+    first.close()
+    assert not os.path.lexists(path)
+    second = SimulatedLine(Device(), link=path).start()
+    first.close()  # its descriptors belong to the second one by now
+    link = SerialLink(path, 115200)
+    link.write(b"ab")
+    assert read_all(link, 2) == b"ba"
+    link.close()
+    second.close()
