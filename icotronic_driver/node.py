@@ -20,8 +20,9 @@ from icotronic_driver.commands import parse_request
 from icotronic_driver.eeprom import PAGE_NAMES, Field, FieldValue
 from icotronic_driver.identifier import STH_1, STU_1
 from icotronic_driver.line import Line
+from icotronic_driver.maintenance import STORED
 from icotronic_driver.sensor import Options, Phase, Sensor, UnitIdentity
-from icotronic_driver.session import STORED, IcotronicBus, Listener
+from icotronic_driver.session import IcotronicBus, Listener
 from icotronic_driver.settings import SETTINGS
 from icotronic_driver.simulator.line import simulated_network
 from icotronic_driver.streaming import AXES
@@ -145,7 +146,7 @@ class IcotronicNode(DeviceNode, Listener):
         self._set_live(bus.sensor.options)
         before, self._stream_options = self._stream_options, self._read_stream_options()
         if self._stream_options != before:
-            bus.restart_stream()
+            bus.acquisition.restart()
 
     def _read_stream_options(self) -> list[Any]:
         return [self.option(name) for name in STREAM_OPTIONS]
@@ -222,21 +223,21 @@ class IcotronicNode(DeviceNode, Listener):
     # --- services, in the executor ---
 
     def _scan(self) -> str:
-        seen = self.call(self.bus.scan)
+        seen = self.call(self.bus.maintenance.scan)
         note = ("; a connected sensor hides the others"
                 if self.bus.sensor.phase is not Phase.SEARCHING else "")
         return f"{len(seen)} in range: {'; '.join(map(str, seen)) or 'none'}{note}"
 
     def _reconnect(self) -> str:
-        self.call(self.bus.reconnect)
+        self.call(self.bus.maintenance.reconnect)
         return "disconnected; searching again"
 
     def _reset(self, node: int) -> str:
-        self.call(lambda: self.bus.reset(node))
+        self.call(lambda: self.bus.maintenance.reset(node))
         return "reset; the sensor will be connected again"
 
     def _read_eeprom(self, node: int) -> str:
-        fields = self.call(lambda: self.bus.read_eeprom(node))
+        fields = self.call(lambda: self.bus.maintenance.read_eeprom(node))
         lines = []
         for page, name in PAGE_NAMES.items():
             content = [f"  {field.name}: {field.text(value)}"
@@ -246,19 +247,20 @@ class IcotronicNode(DeviceNode, Listener):
         return "\n".join(lines)
 
     def _measure(self) -> str:
-        results = self.call(self.bus.measure)
+        results = self.call(self.bus.maintenance.measure)
         return "; ".join(f"{name}: {value:g}" for name, value in results.items())
 
     def _execute_command(self) -> str:
         text, receiver = self.option("command"), RECEIVERS[self.option("command_receiver")]
         request = parse_request(text, receiver)
-        return f"{request.name}: {_in_words(self.call(lambda: self.bus.execute(request)))}"
+        result = self.call(lambda: self.bus.maintenance.execute(request))
+        return f"{request.name}: {_in_words(result)}"
 
     def _preview_save(self) -> str:
-        return f"saving would change {_changes(self.call(self.bus.unsaved))}"
+        return f"saving would change {_changes(self.call(self.bus.maintenance.unsaved))}"
 
     def _save(self) -> str:
-        return f"saved {_changes(self.call(self.bus.save))} in the sensor's EEPROM"
+        return f"saved {_changes(self.call(self.bus.maintenance.save))} in the sensor's EEPROM"
 
     # --- diagnostics ---
 

@@ -20,6 +20,7 @@ from bus_master import BusMaster, BusRecorder, needs_errors_of_socketcand, wait_
 from driver_common import can_link, sample_clock
 from driver_common.device_thread import DeviceThread
 from driver_common.errors import (
+    FrameError,
     LinkError,
     NoAnswerError,
     RefusedError,
@@ -28,7 +29,8 @@ from driver_common.errors import (
 )
 from driver_common.simulator import bus as simulated_bus
 from driver_common.simulator.bus import CanFrame
-from icotronic_driver import commands, session
+from icotronic_driver import acquisition, commands, connection
+from icotronic_driver.access import Access
 from icotronic_driver.commands import CONFIGURATION, EEPROM, STREAMING, SYSTEM
 from icotronic_driver.eeprom import STH_EEPROM, STU_EEPROM, Status
 from icotronic_driver.identifier import SPU_1, STH_1, STU_1, Identifier
@@ -127,9 +129,11 @@ def quick(monkeypatch):
         for module in (unit, sth, stu, line):
             if hasattr(module, name):
                 monkeypatch.setattr(module, name, value)
-    for name, value in (("SETTLE_TIME", 0.05), ("PATIENCE", 0.4), ("CONNECT_POLL", 0.02),
-                        ("KEEP_ALIVE", 0.2), ("SILENCE", 0.4)):
-        monkeypatch.setattr(session, name, value)
+    for module, name, value in (
+            (connection, "SETTLE_TIME", 0.05), (connection, "PATIENCE", 0.4),
+            (connection, "CONNECT_POLL", 0.02), (acquisition, "KEEP_ALIVE", 0.2),
+            (acquisition, "SILENCE", 0.4)):
+        monkeypatch.setattr(module, name, value)
 
 
 @pytest.fixture
@@ -138,7 +142,7 @@ def impatient(monkeypatch):
     request = Line.request
     monkeypatch.setattr(Line, "request",
                         lambda line, asked, timeout=0.15: request(line, asked, timeout))
-    monkeypatch.setattr(session, "DISCONNECT_TIMEOUT", 0.1)
+    monkeypatch.setattr(connection, "DISCONNECT_TIMEOUT", 0.1)
 
 
 @pytest.fixture
@@ -272,7 +276,7 @@ def test_no_sensor_in_range_is_told_once_and_the_sensor_is_found_when_it_comes(s
 
 
 def test_a_sensor_that_advertises_rarely_is_waited_for(start, listen, monkeypatch):
-    monkeypatch.setattr(session, "PATIENCE", 3.0)  # the true one
+    monkeypatch.setattr(connection, "PATIENCE", 3.0)  # the true one
     server = start()
     simulated = server.network.sensors[0]
     simulated.eeprom["Sleep Time 1"] = 0.001  # so it advertises every 1.25 s
@@ -281,7 +285,7 @@ def test_a_sensor_that_advertises_rarely_is_waited_for(start, listen, monkeypatc
 
 
 def test_a_connect_that_is_refused_is_asked_for_again(start, listen, monkeypatch):
-    monkeypatch.setattr(session, "CONNECT_RETRY", 0.2)
+    monkeypatch.setattr(connection, "CONNECT_RETRY", 0.2)
     server = start()
     server.network.faults.refused_connects = 3
     host = listen(server).find()
@@ -290,8 +294,8 @@ def test_a_connect_that_is_refused_is_asked_for_again(start, listen, monkeypatch
 
 
 def test_a_sensor_that_never_connects_is_named(start, listen, monkeypatch):
-    monkeypatch.setattr(session, "CONNECT_RETRY", 0.1)
-    monkeypatch.setattr(session, "CONNECT_TIMEOUT", 0.5)
+    monkeypatch.setattr(connection, "CONNECT_RETRY", 0.1)
+    monkeypatch.setattr(connection, "CONNECT_TIMEOUT", 0.5)
     server = start()
     server.network.faults.refused_connects = 10**6
     host = listen(server)
@@ -362,13 +366,14 @@ def test_a_scan_lists_the_sensors_in_range(start, listen):
     server.network.sensor("Tool-7").rssi = -71
     host = listen(server, sensor_name="Chuck")
     host.lose()
-    assert [(one.name, one.mac[-2:], one.number, one.rssi) for one in host.bus.scan()] == [
+    seen = host.bus.maintenance.scan()
+    assert [(one.name, one.mac[-2:], one.number, one.rssi) for one in seen] == [
         ("Spindle", "81", 0, -52), ("Tool-7", "82", 1, -71)]
 
 
 def test_a_scan_while_connected_shows_the_connected_one(connect):
     host, *_ = connect()
-    assert [one.name for one in host.bus.scan()] == ["Test-STH"]
+    assert [one.name for one in host.bus.maintenance.scan()] == ["Test-STH"]
 
 
 # --- losing it ---------------------------------------------------------------------------------
@@ -458,7 +463,7 @@ def test_a_stream_whose_restart_failed_is_started_later(connect, impatient):
     host.stream()
     network.faults.answer_loss = 1.0
     with pytest.raises(NoAnswerError):
-        host.bus.restart_stream()
+        host.bus.acquisition.restart()
     network.faults.answer_loss = 0.0
     host.more()
 
@@ -466,7 +471,7 @@ def test_a_stream_whose_restart_failed_is_started_later(connect, impatient):
 def test_reconnecting_begins_with_a_new_search(connect):
     host, network, _ = connect()
     host.stream()
-    host.bus.reconnect()
+    host.bus.maintenance.reconnect()
     assert network.stu.connected is None
     assert host.sensor.phase is Phase.SEARCHING
     host.find()
@@ -478,7 +483,7 @@ def test_reconnecting_begins_with_a_new_search(connect):
 def test_after_a_reset_the_sensor_comes_back_without_further_ado(connect, node, options):
     host, network, simulated = connect(**options)
     host.stream()
-    host.bus.reset(node)
+    host.bus.maintenance.reset(node)
     cycles = (simulated if node == STH_1 else network.stu).eeprom["Power On Cycles"]
     assert cycles == 2
     host.find()
@@ -492,12 +497,13 @@ def test_without_a_sensor_each_action_says_why(start, listen):
     server.network.sensors[0].in_range = False
     host = listen(server)
     host.lose()
-    bus = host.bus
+    bus, maintenance = host.bus, host.bus.maintenance
     for action in (
-            lambda: bus.write(bus.sensor, {"led": "disabled"}), bus.measure, bus.unsaved, bus.save,
-            lambda: bus.read_eeprom(STH_1), lambda: bus.reset(STH_1),
+            lambda: bus.write(bus.sensor, {"led": "disabled"}), maintenance.measure,
+            maintenance.unsaved, maintenance.save,
+            lambda: maintenance.read_eeprom(STH_1), lambda: maintenance.reset(STH_1),
             lambda: bus.set_enabled(bus.sensor, True),
-            lambda: bus.execute(commands.READ_STATE.request(STH_1))):
+            lambda: maintenance.execute(commands.READ_STATE.request(STH_1))):
         with pytest.raises(NoAnswerError, match="the sensor is not connected: no sensor is in"):
             action()
 
@@ -509,7 +515,7 @@ def test_before_the_bus_is_open_an_action_says_so(start):
     with pytest.raises(LinkError, match="nothing listens there"):
         bus.open()
     with pytest.raises(NoAnswerError, match="nothing listens there"):
-        bus.measure()
+        bus.maintenance.measure()
 
 
 # --- the thread of the bus ---------------------------------------------------------------------
@@ -723,7 +729,7 @@ def test_losses_are_told_once_and_counted_on(connect):
 
 
 def test_frames_lost_while_the_sensor_was_away_for_a_moment_are_counted(connect, monkeypatch):
-    monkeypatch.setattr(session, "SILENCE", 5.0)
+    monkeypatch.setattr(acquisition, "SILENCE", 5.0)
     monkeypatch.setattr(stu, "SUPERVISION_TIME", 5.0)
     host, network, simulated = connect()
     host.stream(300)
@@ -806,7 +812,7 @@ def test_a_stream_with_other_channels_begins_anew(connect):
     host, _, simulated = connect(channels="x")
     host.stream()
     host.sensor.options.channels = "yz"
-    host.bus.restart_stream()
+    host.bus.acquisition.restart()
     stream = host.more(300)
     assert stream.channels == "yz"
     assert [channel.name for channel in host.sensor.channels] == ["y", "z"]
@@ -819,7 +825,7 @@ def test_frames_still_on_their_way_are_not_taken_for_the_next_stream(connect):
     network.faults.jitter = 0.05
     host.stream(100)
     for _ in range(3):
-        host.bus.restart_stream()
+        host.bus.acquisition.restart()
         host.more(100)
     assert (host.sensor.statistics.lost, network.lost) == (0, 0)
     host.bus.set_active(False)
@@ -895,8 +901,8 @@ def test_an_answer_of_wrong_length_is_an_error_that_shows_it(connect, monkeypatc
     host, _, simulated = connect()
     monkeypatch.setitem(simulated._handlers, (CONFIGURATION, 0x00),
                         lambda payload, now: bytes.fromhex("00 02 05"))
-    with pytest.raises(session.FrameError, match="read the ADC configuration: answer carries 3"):
-        host.bus.execute(commands.READ_ADC.request(STH_1))
+    with pytest.raises(FrameError, match="read the ADC configuration: answer carries 3"):
+        host.bus.maintenance.execute(commands.READ_ADC.request(STH_1))
 
 
 @pytest.mark.parametrize("answer", ["", "02", "02 00 78 79 7A"])
@@ -968,7 +974,7 @@ def test_every_setting_takes_both_ends_of_its_range_and_nothing_else_changes(con
         before = dict(host.sensor.values)
         for value in both_ends(name):
             assert host.bus.write(host.sensor, {name: value}) == {name: value}
-            host.sensor.read_all(session._Access(host.bus.line), SETTINGS, host.bus._note)
+            host.sensor.read_all(Access(host.bus.line), SETTINGS, host.bus._note)
             assert host.sensor.values == before | {name: value}
 
 
@@ -1088,7 +1094,7 @@ def test_a_new_sample_rate_takes_effect_while_streaming(connect):
     host, _, simulated = connect()
     host.stream()
     host.sensor.options.sample_rate = 500.0
-    host.bus.restart_stream()
+    host.bus.acquisition.restart()
     host.more(50)
     assert simulated.adc.sample_rate == pytest.approx(500.0, rel=0.01)
     assert host.heard.values[-1]["adc.prescaler"] == simulated.adc.prescaler
@@ -1107,7 +1113,7 @@ def test_a_new_name_is_followed(connect):
     host, _, simulated = connect(sensor_name="Test-STH")
     host.bus.write(host.sensor, {"name": "Spindle"})
     assert simulated.name == "Spindle"
-    host.bus.reconnect()
+    host.bus.maintenance.reconnect()
     host.find()
     assert host.sensor.identity.name == "Spindle"
 
@@ -1147,7 +1153,7 @@ def test_the_eeprom_is_used_for_channels_that_are_chosen_later(start, listen):
     no_factors(server.network.sensors[0])
     host = listen(server, channels="x").find()
     host.sensor.options.channels = "xyz"
-    host.bus.restart_stream()
+    host.bus.acquisition.restart()
     assert [channel.source for channel in host.sensor.channels] == ["the device's EEPROM"] * 3
 
 
@@ -1220,10 +1226,10 @@ def test_a_calibration_that_is_written_while_streaming_is_used(connect):
 def test_the_whole_eeprom_can_be_read(connect):
     host, network, simulated = connect()
     host.stream()
-    fields = host.bus.read_eeprom(STH_1)
+    fields = host.bus.maintenance.read_eeprom(STH_1)
     assert {field.name: value for field, value in fields.items()} == {
         name: simulated.eeprom[name] for name in STH_EEPROM}
-    fields = host.bus.read_eeprom(STU_1)
+    fields = host.bus.maintenance.read_eeprom(STU_1)
     assert {field.name: value for field, value in fields.items()} == {
         name: network.stu.eeprom[name] for name in STU_EEPROM}
     assert host.sensor.statistics.lost == 0
@@ -1234,7 +1240,7 @@ def test_the_eeprom_of_the_stationary_unit_can_be_read_without_a_sensor(start, l
     server.network.sensors[0].in_range = False
     host = listen(server)
     host.lose()
-    assert host.bus.read_eeprom(STU_1)[STU_EEPROM["STU Name"]] == "Valerie"
+    assert host.bus.maintenance.read_eeprom(STU_1)[STU_EEPROM["STU Name"]] == "Valerie"
 
 
 def test_an_eeprom_that_is_not_initialised_is_told(start, listen):
@@ -1256,10 +1262,10 @@ def change_what_the_eeprom_does_not_take(host, simulated):
 
 def test_a_preview_shows_what_a_save_would_change_and_changes_nothing(connect):
     host, _, simulated = connect()
-    assert host.bus.unsaved() == {}
+    assert host.bus.maintenance.unsaved() == {}
     change_what_the_eeprom_does_not_take(host, simulated)
     writes = simulated.eeprom.writes
-    changes = host.bus.unsaved()
+    changes = host.bus.maintenance.unsaved()
     assert {field.name for field in changes} == {
         "Sleep Time 1", "Acceleration Y: Slope", "Acceleration Y: Offset"}
     assert changes[STH_EEPROM["Sleep Time 1"]] == (77.0, 120.0)
@@ -1270,22 +1276,22 @@ def test_only_what_differs_is_saved_and_it_survives_a_reset(connect):
     host, _, simulated = connect()
     change_what_the_eeprom_does_not_take(host, simulated)
     writes = simulated.eeprom.writes
-    assert len(host.bus.save()) == 3
+    assert len(host.bus.maintenance.save()) == 3
     assert simulated.eeprom.writes == writes + 3
-    assert host.bus.save() == {}
+    assert host.bus.maintenance.save() == {}
     assert simulated.eeprom.writes == writes + 3
-    host.bus.reset(STH_1)
+    host.bus.maintenance.reset(STH_1)
     host.find()
     assert simulated.eeprom["Sleep Time 1"] == 120.0
     assert host.sensor.values["reduced_energy.sleep_time"] == 120.0
-    assert host.bus.unsaved() == {}
+    assert host.bus.maintenance.unsaved() == {}
 
 
 def test_what_was_not_changed_is_not_saved(connect):
     host, _, simulated = connect()
     set_calibration(simulated, 0.5, -7.0, "Z")  # the factors that the firmware works with differ
     host.bus.write(host.sensor, {"name": "Spindle"})
-    host.bus.save()
+    host.bus.maintenance.save()
     assert simulated.eeprom["Acceleration Z: Slope"] == 0.5
 
 
@@ -1302,11 +1308,11 @@ def test_a_locked_eeprom_refuses_a_save_with_the_field_that_it_refused(connect, 
 
     monkeypatch.setattr(simulated.eeprom, "write", locked)
     with pytest.raises(RefusedError) as caught:
-        host.bus.save()
+        host.bus.maintenance.save()
     assert "Acceleration Y: Slope" in str(caught.value)
     assert "write not allowed" in str(caught.value)
     assert "saved before: Sleep Time 1" in str(caught.value)
-    assert {field.name for field in host.bus.unsaved()} == {
+    assert {field.name for field in host.bus.maintenance.unsaved()} == {
         "Acceleration Y: Slope", "Acceleration Y: Offset"}
 
 
@@ -1316,7 +1322,7 @@ def test_an_eeprom_that_does_not_keep_what_it_acknowledged_is_noticed(connect, m
     monkeypatch.setattr(simulated.eeprom, "write", lambda page, offset, content: None)
     with pytest.raises(RefusedError, match="Sleep Time 1 was not saved: the EEPROM took 120 s "
                                            "but holds 77 s; it may be locked"):
-        host.bus.save()
+        host.bus.maintenance.save()
 
 
 def test_a_save_that_is_not_possible_says_so(connect):
@@ -1324,7 +1330,7 @@ def test_a_save_that_is_not_possible_says_so(connect):
     change_what_the_eeprom_does_not_take(host, simulated)
     simulated.refuse.add((EEPROM, 0x01))
     with pytest.raises(RefusedError, match="cannot write the EEPROM: not available"):
-        host.bus.save()
+        host.bus.maintenance.save()
 
 
 # --- other commands ----------------------------------------------------------------------------
@@ -1334,7 +1340,7 @@ def test_a_calibration_measurement_measures_everything(connect):
     simulated.temperature = 31.25
     simulated.vibration = lambda times: np.tile([0.0, 50.0, -50.0], (len(times), 1))
     host.stream()
-    results = host.bus.measure()
+    results = host.bus.maintenance.measure()
     assert results["temperature [°C]"] == 31.25
     assert [results[f"acceleration {axis}"] for axis in (1, 2, 3)] == pytest.approx(
         [32768, 49151, 16384], abs=2)
@@ -1345,15 +1351,16 @@ def test_a_calibration_measurement_measures_everything(connect):
 def test_a_measurement_that_is_refused_is_left_out(connect):
     host, _, simulated = connect()
     simulated.refuse.add((CONFIGURATION, 0x62))
-    assert host.bus.measure() == {}
+    assert host.bus.maintenance.measure() == {}
 
 
 def test_any_request_can_be_carried_out_while_streaming(connect):
     host, _, simulated = connect()
     host.stream()
-    assert host.bus.execute(commands.READ_STATE.request(STH_1)).state is NetworkState.OPERATING
-    assert host.bus.execute(commands.READ_ADC.request(STH_1)) == simulated.adc
-    signal = host.bus.execute(commands.TEST_SIGNAL.request(STU_1, 1, 2, b"\x03"))
+    execute = host.bus.maintenance.execute
+    assert execute(commands.READ_STATE.request(STH_1)).state is NetworkState.OPERATING
+    assert execute(commands.READ_ADC.request(STH_1)) == simulated.adc
+    signal = execute(commands.TEST_SIGNAL.request(STU_1, 1, 2, b"\x03"))
     assert (signal.shape, signal.module) == (1, 0x302)
     host.more()
 
@@ -1361,7 +1368,7 @@ def test_any_request_can_be_carried_out_while_streaming(connect):
 def test_a_request_to_a_node_that_is_not_there_is_named(connect, impatient):
     host, *_ = connect()
     with pytest.raises(NoAnswerError, match=r"STH 5 does not answer on .* \(read the state\)"):
-        host.bus.execute(commands.READ_STATE.request(5))
+        host.bus.maintenance.execute(commands.READ_STATE.request(5))
 
 
 def test_closing_leaves_the_sensor_stopped_and_disconnected(connect):

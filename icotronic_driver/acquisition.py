@@ -1,0 +1,293 @@
+"""Measuring: sample rate, start and stop, looking after a stream, readings now and then."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import time
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from driver_common.errors import DriverError, FrameError, NoAnswerError, RefusedError
+from driver_common.sample_clock import HostClock, SampleClock
+from driver_common.settings import Value
+from icotronic_driver import commands
+from icotronic_driver.access import Access
+from icotronic_driver.commands import SELF
+from icotronic_driver.identifier import STH_1, STU_1
+from icotronic_driver.line import Line, StreamHandler
+from icotronic_driver.request import Request
+from icotronic_driver.sensor import Phase, Sensor
+from icotronic_driver.settings import SETTINGS, nearest_adc_configuration
+from icotronic_driver.streaming import StreamDecoder, supply_voltage
+
+if TYPE_CHECKING:
+    from icotronic_driver.session import Listener
+
+T = TypeVar("T")
+
+LISTEN_TIME = 0.05  # s that jobs of others wait at most
+KEEP_ALIVE = 1.0  # s between checks of a connection without a stream
+SILENCE = 1.0  # s without a frame after which the stream is looked after
+ON_THE_WAY = 0.05  # s without a frame after which none of a stopped stream will come
+
+
+class Acquisition:
+    """The stream of a connected sensor, and the settings on which it depends."""
+
+    def __init__(self, line: Line, sensor: Sensor, access: Access, listener: Listener,
+                 wanted: Callable[[], bool]) -> None:
+        """Prepare to measure.
+
+        Args:
+            line: The bus on which the sensor streams.
+            sensor: The sensor.
+            access: Its settings.
+            listener: Is told of streams, readings and notes.
+            wanted: Says whether the sensor is to measure.
+        """
+        self._line = line
+        self._sensor = sensor
+        self._access = access
+        self._listener = listener
+        self._wanted = wanted
+        self._last_frame = 0.0
+        self._host_clock = HostClock()
+        self._told_rate = ""
+        self._next_reading = 0.0
+        self._readings = itertools.cycle(_READINGS)
+
+    # --- settings ---
+
+    @property
+    def follows_sample_rate(self) -> bool:
+        """Whether the rate settings of the ADC follow from the option `sample_rate`."""
+        options = self._sensor.options
+        return bool(options.sample_rate) and options.config_mode != "leave"
+
+    def configure(self) -> None:
+        """Make a connected sensor as wanted; raises DriverError."""
+        self._apply_sample_rate()
+        self._sensor.make_as_wanted(self.write, self._note)
+        self._choose_calibrations()
+
+    def write(self, changes: Mapping[str, Value]) -> dict[str, Value]:
+        """Write settings, and return what the sensor reports; raises DriverError."""
+        sensor = self._sensor
+        with self._stopped_for(changes):
+            reported = sensor.write(self._access, changes)
+            if any(name.startswith(("calibration.", "adc.reference")) for name in changes):
+                self._choose_calibrations()
+        if "name" in changes and sensor.options.sensor_name:
+            sensor.options.sensor_name = str(reported["name"])
+        return reported
+
+    def _apply_sample_rate(self) -> None:
+        """Turn the wanted sample rate into settings of the ADC."""
+        sensor = self._sensor
+        if self.follows_sample_rate:
+            total = sensor.options.sample_rate * sensor.format.channel_count
+            adc = nearest_adc_configuration(total, sensor.adc.reference_voltage)
+            sensor.options.wanted |= {
+                "adc.prescaler": adc.prescaler, "adc.acquisition_time": adc.acquisition_time,
+                "adc.oversampling_rate": adc.oversampling_rate}
+            text = (f"sample_rate {sensor.options.sample_rate:g}/s: nearest is "
+                    f"{adc.sample_rate / sensor.format.channel_count:.6g}/s with prescaler "
+                    f"{adc.prescaler}, acquisition time {adc.acquisition_time} and oversampling "
+                    f"rate {adc.oversampling_rate}")
+            if text != self._told_rate:
+                self._note(text)
+            self._told_rate = text
+
+    def _choose_calibrations(self) -> None:
+        for complaint in self._sensor.choose_calibrations():
+            self._note(complaint, warning=True)
+
+    def read_again(self) -> None:
+        """Read all settings, and take those that changed as wanted; raises DriverError."""
+        sensor, before = self._sensor, self._sensor.values
+        sensor.read_all(self._access, SETTINGS, self._note)
+        changed = {name: value for name, value in sensor.values.items()
+                   if value != before.get(name) and value == value}  # NaN is no change
+        sensor.options.wanted |= changed
+        sensor.unsaved |= changed.keys()
+        self._choose_calibrations()
+        if changed and sensor.decoder is not None:
+            self.stop()
+            self.start_or_stop()
+        self._listener.on_values(sensor)
+
+    @contextlib.contextmanager
+    def _stopped_for(self, changes: Mapping[str, Value]) -> Iterator[None]:
+        """Stop the stream around changes that need it, or that change how it is decoded."""
+        streaming = self._sensor.decoder is not None and any(
+            name.startswith("calibration.") or SETTINGS[name].needs_stop
+            for name in changes if name in SETTINGS)
+        if streaming:
+            self.stop()
+        try:
+            yield
+        finally:
+            if streaming:
+                self.start_or_stop()
+
+    # --- the stream ---
+
+    def attend(self) -> None:
+        """Receive the stream, or check the connection; read something now and then.
+
+        Raises:
+            DriverError: The sensor is lost.
+        """
+        sensor = self._sensor
+        if self._wanted() != (sensor.decoder is not None):
+            self.start_or_stop()  # it did not work when it was asked for
+        if sensor.decoder is not None:
+            self._receive(sensor.decoder)
+        else:
+            if not self._access.is_connected():
+                raise NoAnswerError("the sensor disconnected")
+            sensor.due = time.monotonic() + KEEP_ALIVE
+        if time.monotonic() >= self._next_reading:
+            self._read_next()
+
+    def restart(self) -> None:
+        """Begin the stream anew, after a change of channels, calibration or rate.
+
+        Raises:
+            DriverError: The sensor does not answer or refuses.
+        """
+        if self._sensor.phase is Phase.CONNECTED:
+            self.stop()
+            self.configure()
+            self.start_or_stop()
+            self._listener.on_values(self._sensor)
+
+    def start_or_stop(self) -> None:
+        """Start or stop the stream, as is wanted; raises DriverError."""
+        if not self._wanted():
+            self.stop()
+        elif self._sensor.decoder is None:
+            self._start()
+        self._sensor.due = 0.0
+
+    def stop(self) -> None:
+        """Stop the stream if there is one; raises DriverError."""
+        if self._sensor.decoder is not None:
+            self._line.request(commands.STOP_ACCELERATION.request(STH_1))
+            self._take_what_is_on_the_way()
+            self._end_stream()
+
+    def _start(self) -> None:
+        sensor = self._sensor
+        form = sensor.format
+        sensor.decoder = StreamDecoder(form, form.frame_rate(sensor.adc.sample_rate))
+        sensor.clock = SampleClock(sensor.sample_rate)
+        self._line.on_stream = self._stream_handler(sensor)
+        self._last_frame = time.monotonic()
+        try:
+            self._line.request(commands.START_ACCELERATION.request(STH_1, form),
+                               self._longest_silence / 2)  # the first frame is the answer
+        except DriverError:
+            self._end_stream()
+            raise
+
+    def _stream_handler(self, sensor: Sensor) -> StreamHandler:
+        """Return what is done with each frame of the stream: the hot path."""
+        decoder, clock, host_clock = sensor.decoder, sensor.clock, self._host_clock
+        assert decoder is not None
+        decode, data_sets, update = decoder.decode_frame, decoder.format.data_sets, clock.update
+        publish = self._listener.on_stream(sensor)
+        lost = 0
+
+        def handle(data: bytearray, bus_time: float, now: int) -> None:
+            nonlocal lost
+            values = decode(bus_time, data, now)  # frames that waited for us were not late
+            if values is None:
+                return
+            number = decoder.number * data_sets
+            update(number + data_sets - 1, now)
+            publish(clock.time_of(number) + host_clock.offset, clock.period, values)
+            if decoder.statistics.lost != lost:
+                if not lost:
+                    self._note(f"{decoder.statistics.lost} frames were lost on the radio; more "
+                               "are counted in the diagnostics only", warning=True)
+                lost = decoder.statistics.lost
+
+        return handle
+
+    def _receive(self, decoder: StreamDecoder) -> None:
+        """Receive for a moment; look after a stream that fell silent."""
+        frames = decoder.statistics.frames
+        self._host_clock.follow()
+        self._line.listen(LISTEN_TIME)
+        if decoder.statistics.frames != frames:
+            self._last_frame = time.monotonic()
+        elif time.monotonic() - self._last_frame > self._longest_silence:
+            self._look_after_stream()
+
+    @property
+    def _longest_silence(self) -> float:
+        """Time in s without a frame after which something is wrong with the stream."""
+        return max(SILENCE, 3 / self._sensor.format.frame_rate(self._sensor.adc.sample_rate))
+
+    def _look_after_stream(self) -> None:
+        """React to a stream that fell silent: start it again where the sensor is still there."""
+        if not self._access.is_connected():
+            raise NoAnswerError("the sensor was lost while it streamed")
+        self._end_stream()
+        self._note("the stream fell silent; starting it again", warning=True)
+        self.start_or_stop()
+
+    def _end_stream(self) -> None:
+        self._line.on_stream = None
+        self._sensor.end_stream()
+
+    def _take_what_is_on_the_way(self) -> None:
+        """Receive the last frames of a stopped stream, before the next one could get them."""
+        frames, end = -1, time.monotonic() + SILENCE
+        while frames != self._sensor.statistics.frames and time.monotonic() < end:
+            frames = self._sensor.statistics.frames
+            self._line.listen(ON_THE_WAY)
+
+    # --- readings ---
+
+    def _read_next(self) -> None:
+        """Read one of the things that are read now and then; what is refused is left out."""
+        period = self._sensor.options.status_period
+        self._next_reading = time.monotonic() + period / len(_READINGS)
+        name, make_request, convert = next(self._readings)
+        try:
+            value = convert(self._sensor, self._line.request(make_request()))
+        except (RefusedError, FrameError, NoAnswerError):
+            value = None
+        setattr(self._sensor.readings, name, value)
+        if value is not None:
+            self._listener.on_readings(self._sensor, name)
+
+    def _note(self, text: str, *, warning: bool = False) -> None:
+        self._listener.on_note(self._sensor, text, warning=warning)
+
+
+def _as_it_is(sensor: Sensor, value: T) -> T:
+    return value
+
+
+def _battery_voltage(sensor: Sensor, values: tuple[int, ...]) -> float:
+    return supply_voltage(values[0], sensor.adc.reference_voltage)
+
+
+# What is read now and then: name in Readings, request, conversion.
+_READINGS: tuple[tuple[str, Callable[[], Request[Any]], Callable[[Sensor, Any], Any]], ...] = (
+    ("rssi", lambda: commands.READ_RSSI.request(STH_1, SELF), _as_it_is),
+    ("battery_voltage", lambda: commands.read_voltage(STH_1), _battery_voltage),
+    ("temperature", lambda: commands.READ_TEMPERATURE.request(STH_1), _as_it_is),
+    ("sth_status", lambda: commands.READ_STH_STATUS.request(STH_1), _as_it_is),
+    ("stu_status", lambda: commands.READ_STU_STATUS.request(STU_1), _as_it_is),
+    ("sth_errors", lambda: commands.READ_STH_ERRORS.request(STH_1), _as_it_is),
+    ("stu_errors", lambda: commands.READ_STU_ERRORS.request(STU_1), _as_it_is),
+    ("power_cycles", lambda: commands.READ_POWER_CYCLES.request(STH_1), _as_it_is),
+    ("operating_time", lambda: commands.READ_OPERATING_TIME.request(STH_1), _as_it_is),
+    ("under_voltages", lambda: commands.READ_UNDER_VOLTAGES.request(STH_1), _as_it_is),
+    ("watchdog_resets", lambda: commands.READ_WATCHDOG_RESETS.request(STH_1), _as_it_is),
+)
