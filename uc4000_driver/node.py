@@ -17,10 +17,11 @@ from driver_common.device_node import DeviceNode, run
 from driver_common.settings import Option
 from msg_conversions.range import NO_ECHO_VALUES, distance_or_no_echo, to_range
 from msg_conversions.temperature import to_temperature
+from uc4000_driver.acquisition import OPERATING_TEMPERATURE, Listener
 from uc4000_driver.commands import MAX_CYCLES, PROFILES, Outcome
 from uc4000_driver.line import ECHO_CHOICES
 from uc4000_driver.sensor import Measurement, Options, Sensor
-from uc4000_driver.session import OPERATING_TEMPERATURE, Listener, Uc4000Bus
+from uc4000_driver.session import Uc4000Bus
 from uc4000_driver.settings import ALL_SETTINGS
 from uc4000_driver.simulator.line import simulated_line
 from uc4000_driver.telegram import BAUD_RATE, LAST_ADDRESS, error_text
@@ -69,7 +70,7 @@ class Uc4000Node(DeviceNode, Listener):
         Option("temperature_period", kind=float, default=10.0, minimum=0.0, unit="s", live=True,
                description="Time between two readings of the temperature; 0 = none"),
         Option("new_address", kind=int, default=0, minimum=0, maximum=LAST_ADDRESS, live=True,
-               description="Address that the service ~/assign_address gives the sensor"),
+               description="Address that the service ~/change_address gives the sensor"),
     )
     ALL_SETTINGS = ALL_SETTINGS
 
@@ -128,8 +129,8 @@ class Uc4000Node(DeviceNode, Listener):
             "range": self.add_publisher(Range, sensor, "range"),
             "temperature": self.add_publisher(Temperature, sensor, "temperature")}
         self.add_trigger(sensor, "identify", lambda: self._identify(self.device(sensor)))
-        self.add_trigger(sensor, "assign_address",
-                         lambda: self._assign_address(self.device(sensor)))
+        self.add_trigger(sensor, "change_address",
+                         lambda: self._change_address(self.device(sensor)))
 
     # --- what the bus reports, in its thread ---
 
@@ -163,12 +164,12 @@ class Uc4000Node(DeviceNode, Listener):
     # --- services, in the executor ---
 
     def _identify(self, sensor: Sensor) -> str:
-        self.call(lambda: self.bus.identify(sensor))
+        self.call(lambda: self.bus.maintenance.identify(sensor))
         return self.describe(sensor)
 
-    def _assign_address(self, sensor: Sensor) -> str:
-        return self.give_address(sensor.options.name,
-                                 lambda address: self.bus.assign_address(sensor, address))
+    def _change_address(self, sensor: Sensor) -> str:
+        return self.give_address(
+            sensor.options.name, partial(self.bus.maintenance.change_address, sensor))
 
     # --- diagnostics ---
 
@@ -191,7 +192,7 @@ class Uc4000Node(DeviceNode, Listener):
             "refusals": counts.refusals.total(), "connections": sensor.connections,
             "stray bytes": line.stray_bytes,
             "local echo": {None: "unknown", True: "on", False: "off"}[line.echo]}
-        for group in self.bus.groups:
+        for group in self.bus.acquisition.groups:
             if sensor.options.name in group.names:
                 values["failed measurements of its group"] = group.failures
         values |= sensor.differences

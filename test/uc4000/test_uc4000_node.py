@@ -320,7 +320,7 @@ def test_an_address_is_assigned(simulated, uc4000, heard):
     for address in (5, 1):
         old = simulated["left"].address
         assert uc4000.set("left.new_address", address).successful
-        response = uc4000.trigger("left/assign_address")
+        response = uc4000.trigger("left/change_address")
         assert response.success
         assert response.message == (
             f"the sensor moved from address {old} to {address} and keeps it; put 'left.address: "
@@ -336,7 +336,7 @@ def test_an_address_is_assigned(simulated, uc4000, heard):
 ])
 def test_an_address_cannot_be_assigned(simulated, uc4000, address, text):
     assert uc4000.set("left.new_address", address).successful
-    response = uc4000.trigger("left/assign_address")
+    response = uc4000.trigger("left/change_address")
     assert not response.success
     assert response.message == text
 

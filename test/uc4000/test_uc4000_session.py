@@ -78,6 +78,9 @@ class Master(BusMaster):
     def distances(self, count=1, name=None):
         return [measurement.distance.value for measurement in self.measure(count, name)]
 
+    def write(self, changes):
+        return self.bus.maintenance.write(self.sensor, changes)
+
     def note(self, text):
         """Poll until a note contains the text."""
         self.until(lambda: any(text in note for note in self.heard.notes))
@@ -246,7 +249,7 @@ def test_the_settings_of_the_user_profile_change_what_is_seen(one, changes, seen
     simulated.scene = lambda now: 3.9
     master.sensor.options.profile = "user"
     master.find()
-    master.bus.write(master.sensor, changes)
+    master.write(changes)
     (measurement,) = master.measure()
     assert (measurement.distance.outcome is Outcome.ECHO) == seen
 
@@ -263,7 +266,7 @@ def test_without_compensation_the_temperature_matters(one):
     _, simulated, master = one
     simulated.temperature = 50.0
     warm = master.distances()[0]
-    master.bus.write(master.sensor, {"temperature_compensation": "off"})
+    master.write({"temperature_compensation": "off"})
     assert master.distances()[0] == pytest.approx(0.952 * warm, abs=STEP)
 
 
@@ -390,7 +393,7 @@ def test_a_write_is_read_back_and_nothing_is_written_twice(one):
     master.find()
     asked = Requests(simulated)
     for _ in range(2):
-        assert master.bus.write(master.sensor, {"gain_db": 57, "burst_periods": 64}) == {
+        assert master.write({"gain_db": 57, "burst_periods": 64}) == {
             "gain_db": 57.0, "burst_periods": 64}
     assert asked.writes() == [(0x22, 0x01), (0x23, 0x0F)]
     assert simulated.value("gain_db") == 57.0
@@ -407,7 +410,7 @@ def test_a_bad_value_is_refused_before_anything_is_sent(one, changes, text):
     master.find()
     asked = Requests(simulated)
     with pytest.raises(SettingError, match=text):
-        master.bus.write(master.sensor, {"burst_periods": 8, **changes})
+        master.write({"burst_periods": 8, **changes})
     assert asked.all == []
 
 
@@ -416,7 +419,7 @@ def test_several_are_written_all_or_none(one):
     master.find()
     simulated.refuse[OpCode.TEMPERATURE_COMPENSATION] = ErrorCode.EEPROM_ERROR
     with pytest.raises(RefusedError, match=r"eeprom error \(0x08\)"):
-        master.bus.write(master.sensor, {"gain_db": 60.0, "temperature_compensation": "off"})
+        master.write({"gain_db": 60.0, "temperature_compensation": "off"})
     assert simulated.value("gain_db") == 72.0
     assert master.sensor.values["gain_db"] == 72.0
     assert master.sensor.values["temperature_compensation"] == "unknown"
@@ -433,7 +436,7 @@ def test_a_sensor_that_stores_another_value_is_caught(one):
 
     Requests(simulated, stubborn)
     with pytest.raises(RefusedError, match="took gain_db = 60 dB but reports 72 dB"):
-        master.bus.write(master.sensor, {"gain_db": 60.0})
+        master.write({"gain_db": 60.0})
 
 
 def test_a_refused_setting_does_not_keep_the_others_from_being_written(connect):
@@ -452,7 +455,7 @@ def test_a_code_beyond_the_table_is_shown_and_can_be_mended(connect):
     master = connect.master(line).find()
     assert master.sensor.values["burst_periods"] == -1
     master.note("the code that it reports for burst_periods is not in table A1")
-    assert master.bus.write(master.sensor, {"burst_periods": 16}) == {"burst_periods": 16}
+    assert master.write({"burst_periods": 16}) == {"burst_periods": 16}
 
 
 def test_a_setting_that_the_firmware_does_not_have_is_left_out(connect):
@@ -659,7 +662,7 @@ def test_a_request_that_arrived_damaged_is_sent_again(one, code):
         return answer
 
     Requests(simulated, only_once)
-    assert master.bus.write(master.sensor, {"gain_db": 60.0}) == {"gain_db": 60.0}
+    assert master.write({"gain_db": 60.0}) == {"gain_db": 60.0}
     assert master.sensor.statistics.refusals[code] == 1
 
 
@@ -669,7 +672,7 @@ def test_other_refusals_are_not_asked_again(one):
     asked = Requests(simulated)
     simulated.refuse[OpCode.GAIN] = ErrorCode.SESSION_ERROR
     with pytest.raises(RefusedError, match="address 7 cannot read the amplifier gain: session"):
-        master.bus.write(master.sensor, {"gain_db": 60.0})
+        master.write({"gain_db": 60.0})
     assert len(asked.all) == 1
 
 
@@ -700,11 +703,11 @@ def test_a_lost_sensor_returns_configured_as_before(connect):
     line, (simulated,) = connect()
     wanted = {"temperature_compensation": "off"}
     master = connect.master(line, Options(address=7, wanted=wanted)).find()
-    master.bus.write(master.sensor, {"gain_db": 60.0})
+    master.write({"gain_db": 60.0})
     simulated.silent = True
     assert "no answer from address 7" in str(master.lose())
     with pytest.raises(NoAnswerError, match="is not connected: no answer from"):
-        master.bus.write(master.sensor, {"gain_db": 61.0})
+        master.write({"gain_db": 61.0})
     simulated.power_cycle()
     simulated.restore_factory_settings()
     simulated.silent = False
@@ -845,7 +848,7 @@ def test_a_group_of_seven_is_as_fair_as_it_is_fast(connect):
     assert max(gained) - min(gained) <= 2
     for name, measurement in master.heard.measurements:
         assert measurement.distance.value == still(int(name[1]) - 1)
-    if not master.bus.groups[0].failures:
+    if not master.bus.acquisition.groups[0].failures:
         assert took < 21 * 0.05  # in turn it would be 0.06 s each, and more
 
 
@@ -868,7 +871,7 @@ def test_replies_out_of_order_are_not_mixed_up(connect):
     line, sensors = connect(1, 2)
     master = connect.master(line, *named(1, 2), groups=["s1 s2"]).find()
     sensors[0].evaluation = 0.040  # four times what the manual allows: it answers after the other
-    master.until(lambda: master.bus.groups[0].failures)
+    master.until(lambda: master.bus.acquisition.groups[0].failures)
     master.measure(2)
     for name, measurement in master.heard.measurements:
         assert measurement.distance.value == still(int(name[1]) - 1)
@@ -890,7 +893,7 @@ def test_a_group_that_does_not_work_together_is_measured_one_by_one(connect, tro
         sensors[1].refuse[OpCode.PROFILE_B] = ErrorCode.SESSION_ERROR
     else:
         sensors[1].silent = True
-    master.until(lambda: master.bus.groups[0].failures >= 1)
+    master.until(lambda: master.bus.acquisition.groups[0].failures >= 1)
     assert any("cannot measure together with its group" in note for note in master.heard.notes)
     assert master.distances(1, "s1")[0] == still(0)
     assert master.distances(1, "s3")[0] == still(2)
@@ -904,7 +907,7 @@ def test_a_group_that_does_not_work_together_is_measured_one_by_one(connect, tro
 def test_on_a_bad_line_those_of_a_group_are_not_mixed_up(connect):
     line, sensors = connect(1, 2, 3)
     master = connect.master(line, *named(1, 2, 3), groups=["s1 s2 s3"]).find()
-    group = master.bus.groups[0]
+    group = master.bus.acquisition.groups[0]
     group.backoff.first = group.backoff.last = 0.01
     group.backoff.reset()
     line.faults.corrupt = line.faults.drop = line.faults.noise = 0.05
@@ -942,7 +945,7 @@ def test_bad_addresses(addresses, text):
 def test_an_address_is_assigned_and_followed(one):
     _, simulated, master = one
     master.find()
-    master.bus.assign_address(master.sensor, 2)
+    master.bus.maintenance.change_address(master.sensor, 2)
     assert simulated.address == 2
     assert master.sensor.address == master.sensor.options.address == 2
     assert master.distances() == [still(0)]
@@ -955,7 +958,7 @@ def test_a_lost_acknowledge_of_a_new_address_is_no_failure(one):
     _, simulated, master = one
     master.find()
     Requests(simulated, lambda request, answer: None if request.is_write else answer)
-    master.bus.assign_address(master.sensor, 2)
+    master.bus.maintenance.change_address(master.sensor, 2)
     assert simulated.address == master.sensor.address == 2
 
 
@@ -971,7 +974,7 @@ def test_an_address_that_cannot_be_assigned(connect, address, error, text):
     master = connect.master(line, *named(1, 2)).find()
     asked = Requests(sensors[0])
     with pytest.raises(error, match=text):
-        master.bus.assign_address(master.sensor, address)
+        master.bus.maintenance.change_address(master.sensor, address)
     assert asked.writes() == []
 
 
@@ -980,7 +983,7 @@ def test_a_refused_address_leaves_everything_as_it_was(one):
     master.find()
     simulated.refuse[OpCode.ADDRESS] = ErrorCode.EEPROM_ERROR
     with pytest.raises(RefusedError, match="cannot change the address: eeprom error"):
-        master.bus.assign_address(master.sensor, 2)
+        master.bus.maintenance.change_address(master.sensor, 2)
     assert master.sensor.address == 7
     assert master.distances() == [still(0)]
 
@@ -989,7 +992,7 @@ def test_identify_asks_again(one):
     _, simulated, master = one
     master.find()
     simulated.serial_number = "40000016900099"
-    assert master.bus.identify(master.sensor).serial_number == "40000016900099"
+    assert master.bus.maintenance.identify(master.sensor).serial_number == "40000016900099"
 
 
 # --- the port ----------------------------------------------------------------------------------
@@ -1027,7 +1030,7 @@ def test_unplugged_and_plugged_in_again(connect, tmp_path):
     line.close()
     wait_until(lambda: isinstance(states[-1], LinkError))
     with pytest.raises(NoAnswerError, match="is not connected: "):
-        thread.call(lambda: bus.write(bus.devices[0], {"gain_db": 60.0}))
+        thread.call(lambda: bus.maintenance.write(bus.devices[0], {"gain_db": 60.0}))
     connect(link=link)
     before = len(master.measurements)
     wait_until(lambda: len(master.measurements) > before)

@@ -1,0 +1,77 @@
+"""Requests to one sensor on the wire: asked again, counted; and its records."""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+from driver_common.errors import FrameError, NoAnswerError, RefusedError
+from driver_common.settings import UNKNOWN, Raw, Record
+from uc4000_driver.commands import Command, Uc4000Record
+from uc4000_driver.line import Line, TelegramRefusedError
+from uc4000_driver.sensor import Sensor
+
+T = TypeVar("T")
+
+ATTEMPTS = 2
+
+
+class Access:
+    """What can be asked of one sensor; its records are for `read_settings` and `write_settings`."""
+
+    def __init__(self, line: Line, sensor: Sensor) -> None:
+        """Take the wire and the sensor."""
+        self._line = line
+        self._sensor = sensor
+
+    def execute(self, command: Command[T], attempts: int = ATTEMPTS) -> T:
+        """Carry out a command; raises DriverError."""
+        return self.timed(command, attempts)[0]
+
+    def timed(self, command: Command[T], attempts: int = ATTEMPTS) -> tuple[T, int]:
+        """Carry out a command, again where the transmission fails; see `Line.ask`."""
+        for _ in range(attempts - 1):
+            try:
+                return self._ask(command)
+            except TelegramRefusedError as error:
+                if not error.is_transmission:
+                    raise
+            except (NoAnswerError, FrameError):
+                pass
+        return self._ask(command)
+
+    def _ask(self, command: Command[T]) -> tuple[T, int]:
+        """Ask once, and count what goes wrong."""
+        sensor = self._sensor
+        try:
+            return self._line.ask(sensor.address, command, str(sensor))
+        except TelegramRefusedError as error:
+            sensor.statistics.refusals[error.code] += 1
+            raise
+        except NoAnswerError:
+            sensor.statistics.timeouts += 1
+            raise
+        except FrameError as error:
+            sensor.statistics.damaged += 1
+            raise FrameError(f"{error}; interference, or two sensors have address "
+                             f"{sensor.address}") from None
+
+    def read_record(self, record: Record) -> tuple[Raw, ...]:
+        """Return what a record holds; where it cannot be read, what was acknowledged."""
+        assert isinstance(record, Uc4000Record)
+        if record.write_only:
+            return (self._sensor.acknowledged.get(record.name, UNKNOWN),)
+        return (self.execute(record.read()),)
+
+    def write_record(self, record: Record, values: tuple[Raw, ...]) -> None:
+        """Write a record; raises RefusedError where the sensor stores something else."""
+        assert isinstance(record, Uc4000Record)
+        self._sensor.acknowledged.pop(record.name, None)
+        if values == (UNKNOWN,):
+            return  # nobody knows what was there before
+        command = record.write(values)
+        stored = self.execute(command)
+        if record.write_only:  # its reply is not shown in the manual
+            self._sensor.acknowledged[record.name] = values[0]
+        elif stored != values[0]:
+            raise RefusedError(f"{self._sensor} cannot {command.name}: it stored code {stored} "
+                               f"instead of {values[0]!r}")

@@ -1,0 +1,146 @@
+"""Finding a sensor on the wire, and whether it is still there and as it was."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import partial
+
+from driver_common.device_bus import Listener
+from driver_common.errors import (
+    DriverError,
+    FrameError,
+    NoAnswerError,
+    RefusedError,
+    WrongDeviceError,
+)
+from driver_common.settings import UNKNOWN
+from uc4000_driver import commands
+from uc4000_driver.access import ATTEMPTS, Access
+from uc4000_driver.line import Line
+from uc4000_driver.sensor import PRODUCT, Identity, Sensor
+from uc4000_driver.settings import ALL_SETTINGS
+from uc4000_driver.telegram import CAST, FIRST_ADDRESS, LAST_ADDRESS
+
+
+class Connection:
+    """Finds, identifies and configures the sensors on a wire."""
+
+    def __init__(self, line: Line, listener: Listener[Sensor], *, alone: bool) -> None:
+        """Prepare; nothing is sent.
+
+        Args:
+            line: The wire.
+            listener: Told what is worth a line in the log.
+            alone: Whether only one sensor is expected on the wire.
+        """
+        self._line = line
+        self._listener = listener
+        self._alone = alone
+
+    def find(self, sensor: Sensor) -> None:
+        """Find the sensor, identify and configure it; raises DriverError."""
+        if sensor.options.address == CAST:
+            sensor.address = self._ask_address()
+        self.check_address(sensor, attempts=1)
+        sensor.identity = self.identify(sensor)
+        try:
+            self._read_all(sensor)
+            self._make_as_wanted(sensor)
+        except DriverError:
+            sensor.identity = None
+            raise
+
+    def identify(self, sensor: Sensor) -> Identity:
+        """Ask the sensor who it is; raises DriverError."""
+        access = Access(self._line, sensor)
+        version = access.execute(commands.READ_VERSION)
+        if not version.startswith("HW"):
+            raise WrongDeviceError(f"{sensor} says that its version is {version!r}, which is not "
+                                   f"that of a {PRODUCT}; connect the right device")
+        return Identity(version, access.execute(commands.READ_SERIAL_NUMBER))
+
+    def check_address(self, sensor: Sensor, attempts: int = ATTEMPTS) -> None:
+        """Ask the sensor for its address; raises DriverError."""
+        address = Access(self._line, sensor).execute(commands.READ_ADDRESS, attempts)
+        if address != sensor.address:
+            raise FrameError(f"{sensor} says that its address is {address}")
+
+    def look_again(self, sensor: Sensor) -> None:
+        """Look after a silence whether the sensor is as it was: it may have lost its settings."""
+        self.check_address(sensor, attempts=1)
+        settings, before = sensor.settings, sensor.values
+        try:
+            self._read_all(sensor)
+        except DriverError:
+            sensor.settings, sensor.values = settings, before
+            raise
+        if sensor.values != before:
+            sensor.acknowledged.clear()  # it must be taken for lost as well
+            self._read_all(sensor)
+            self._make_as_wanted(sensor)
+            self._listener.on_values(sensor)
+
+    def _read_all(self, sensor: Sensor) -> None:
+        sensor.read_all(Access(self._line, sensor), ALL_SETTINGS,
+                        partial(self._listener.on_note, sensor))
+
+    def _make_as_wanted(self, sensor: Sensor) -> None:
+        note = partial(self._listener.on_note, sensor)
+        for name, value in sensor.values.items():
+            if value == UNKNOWN:
+                note(f"the code that it reports for {name} is not in table A1 of the manual",
+                     warning=True)
+        sensor.make_as_wanted(partial(sensor.write, Access(self._line, sensor)), note)
+
+    # --- addresses ---
+
+    def answers_at(self, address: int, attempts: int = ATTEMPTS) -> bool:
+        """Whether something answers at an address; raises LinkError."""
+        for _ in range(attempts):
+            try:
+                self._line.ask(address, commands.READ_ADDRESS, f"address {address}")
+            except NoAnswerError:
+                continue
+            except (FrameError, RefusedError):
+                pass
+            return True
+        return False
+
+    def _answering(self, addresses: Iterable[int]) -> list[int]:
+        return [address for address in addresses if self.answers_at(address, attempts=1)]
+
+    def _ask_address(self) -> int:
+        """Ask for the address by cast; one sensor on the wire may answer (section 5.1.6.3)."""
+        try:
+            address = self._line.ask(CAST, commands.ASK_ADDRESS, "any sensor")[0]
+        except FrameError:
+            found = self._answering(range(FIRST_ADDRESS, LAST_ADDRESS + 1))
+            if len(found) < 2:
+                raise
+        else:  # the wire carries a 1 only where all send one: others may hide behind the answer
+            found = self._answering(other for other in range(address + 1, LAST_ADDRESS + 1)
+                                    if other & address == address)
+            if not found:
+                return address
+            found = [*self._answering([address]), *found]
+        raise WrongDeviceError(
+            f"several sensors answer ({', '.join(map(str, found))}); say which one with the "
+            "parameter address, or name all of them with the parameter sensors") from None
+
+    def explained(self, sensor: Sensor, error: DriverError) -> DriverError:
+        """Add to "no answer" what could be found out about the reason."""
+        if not isinstance(error, NoAnswerError):
+            return error
+        hint = "; check power, wiring and the address"
+        if self._line.echo:
+            hint = ("; the line returns what is sent, so it is right up to there: check the "
+                    "sensor's power and wiring, and the address")
+        if self._alone and sensor.options.address != CAST:
+            try:
+                hint = (f", but a sensor answers at address {self._ask_address()}; correct the "
+                        "parameter address")
+            except WrongDeviceError as several:
+                hint = f", but {several}"
+            except (NoAnswerError, FrameError, RefusedError):
+                pass
+        return NoAnswerError(f"{error}{hint}")
