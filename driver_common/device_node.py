@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import sys
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, Protocol
 
@@ -59,6 +59,7 @@ class DeviceNode(LifecycleNode):
         simulator: What `make_bus` started to have something to talk to.
     """
 
+    KIND = "sensor"  # what a device without a name is called
     SEVERAL_SENSORS = True  # whether the bus can have more than one
     BUS_OPTIONS: Sequence[Option] = ()
     SENSOR_OPTIONS: Sequence[Option] = ()
@@ -78,6 +79,7 @@ class DeviceNode(LifecycleNode):
         self._bus_error: DriverError | None = None
         self._statuses: list[DiagnosticStatus] = []
         self._statuses_due = 0.0
+        self._statuses_made = 0.0
         self._diagnostics = diagnostics.Diagnostics(self)
         self._devices: dict[str, Any] = {}
         self._entities: list[Callable[[], object]] = []
@@ -435,7 +437,7 @@ class DeviceNode(LifecycleNode):
         Args:
             pause: Time in s until there is anything new.
         """
-        now = time.monotonic()
+        now = self._statuses_made = time.monotonic()
         if now + pause < self._statuses_due:
             return
         self._statuses_due = now + 0.9 * diagnostics.PERIOD
@@ -444,19 +446,29 @@ class DeviceNode(LifecycleNode):
         except Exception as error:  # it must not disturb the bus
             text = f"internal error, please report it: {error!r}"
             self.get_logger().error(text, throttle_duration_sec=60.0)
-            self._statuses = [diagnostics.to_status(
-                self.get_name(), "", diagnostics.ERROR, text, {})]
+            self._statuses = self._same_for_all(diagnostics.ERROR, text)
 
     def _publish_diagnostics(self) -> None:
+        silence = time.monotonic() - self._statuses_made
         if self.bus is None:
-            statuses: Iterable[DiagnosticStatus] = [diagnostics.to_status(
-                self.get_name(), "", diagnostics.STALE, "not configured", {})]
+            statuses = self._same_for_all(diagnostics.STALE, "not configured")
         elif self._bus_error is not None:
-            statuses = [diagnostics.to_status(
-                self.get_name(), "", diagnostics.ERROR, str(self._bus_error), {})]
+            statuses = self._same_for_all(diagnostics.ERROR, str(self._bus_error))
+        elif silence > diagnostics.LATEST:
+            statuses = self._same_for_all(
+                diagnostics.ERROR, f"the bus has been busy for {silence:.0f} s without an end; "
+                                   "nothing is known of the device meanwhile")
         else:
             statuses = self._statuses
         self._diagnostics.publish(statuses)
+
+    def _same_for_all(self, level: bytes, message: str) -> list[DiagnosticStatus]:
+        return [diagnostics.to_status(self.status_name(sensor), "", level, message, {})
+                for sensor in self.sensors]
+
+    def status_name(self, sensor: str) -> str:
+        """Return the name of a sensor's status, the same whatever happens and in no other node."""
+        return f"{self.get_fully_qualified_name().lstrip('/')}: {sensor or self.KIND}"
 
     # --- lifecycle ---
 
@@ -486,6 +498,7 @@ class DeviceNode(LifecycleNode):
             self._close()
             return TransitionCallbackReturn.FAILURE
         self.bus = bus
+        self._statuses_due = 0.0
         self._note_statuses(0.0)
         self.thread = DeviceThread(f"{self.get_name()} bus", bus, self.on_bus_state,
                                    self._note_statuses)

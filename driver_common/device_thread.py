@@ -15,6 +15,7 @@ from driver_common.errors import DriverError, NoAnswerError
 T = TypeVar("T")
 
 CALL_TIMEOUT = 15.0  # s; longer than any single job
+LONGEST_PAUSE = 1.0  # s; then the bus shows that it is alive
 
 
 class Backoff:
@@ -124,7 +125,7 @@ class DeviceThread(threading.Thread):
                 self._bus.open()
                 works = False  # some links fail only when they are used
                 while not self._stopping:
-                    pause = self._bus.poll()
+                    pause = min(self._bus.poll(), LONGEST_PAUSE)
                     if not works:
                         works = True
                         backoff.reset()

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterable, Mapping
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
+from rclpy.qos_overriding_options import QoSOverridingOptions
+
+from msg_conversions.header import to_header
 
 PERIOD = 1.0  # s
+LATEST = 3.0  # s after which what was said is not true any more
 
 OK, WARN, ERROR, STALE = (DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR,
                           DiagnosticStatus.STALE)
@@ -27,11 +32,11 @@ class Diagnostics:
 
     def __init__(self, node: Node) -> None:
         """Create the publisher."""
-        self._node = node
-        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._publisher = node.create_publisher(
+            DiagnosticArray, "/diagnostics", 10,
+            qos_overriding_options=QoSOverridingOptions.with_default_policies())
 
     def publish(self, statuses: Iterable[DiagnosticStatus]) -> None:
-        """Publish statuses, stamped now."""
-        array = DiagnosticArray(status=list(statuses))
-        array.header.stamp = self._node.get_clock().now().to_msg()
-        self._publisher.publish(array)
+        """Publish statuses, stamped with the host's clock like the data."""
+        self._publisher.publish(DiagnosticArray(
+            header=to_header("", time.time_ns()), status=list(statuses)))

@@ -295,7 +295,7 @@ class IcotronicNode(DeviceNode, Listener):
             "unsaved settings": ", ".join(sorted(sensor.unsaved & STORED.keys()))}
         values |= sensor.differences
         identity = sensor.identity
-        return diagnostics.to_status(f"{self.get_name()}: {sensor.title}",
+        return diagnostics.to_status(self.status_name(sensor.options.name),
                                      f"{identity.name} {identity.mac}" if identity else "",
                                      *self._health(sensor), values)
 

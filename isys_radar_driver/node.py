@@ -53,6 +53,7 @@ class ModelOption(Option):
 class IsysRadarNode(DeviceNode, Listener):
     """Driver of one or several iSYS radars on a serial line."""
 
+    KIND = Radar.KIND
     BUS_OPTIONS = (
         Option("serial_port", kind=str, default="",
                description="Device path, pyserial URL such as socket://host:port, or sim://MODEL"),
@@ -313,9 +314,9 @@ class IsysRadarNode(DeviceNode, Listener):
         values |= {f"{name} temperature [°C]": celsius
                    for name, celsius in radar.temperatures.items()}
         values |= radar.differences
-        name = f"{self.get_name()}: {radar.title}"
         hardware_id = f"{identity.model.name} {identity.serial_number}" if identity else ""
-        return diagnostics.to_status(name, hardware_id, *self._health(radar), values)
+        return diagnostics.to_status(self.status_name(radar.options.name), hardware_id,
+                                     *self._health(radar), values)
 
     def _health(self, radar: Radar) -> tuple[bytes, str]:
         """Return level and message of the diagnostics."""

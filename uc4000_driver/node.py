@@ -196,9 +196,9 @@ class Uc4000Node(DeviceNode, Listener):
             if sensor.options.name in group.names:
                 values["failed measurements of its group"] = group.failures
         values |= sensor.differences
-        name = f"{self.get_name()}: {sensor.title}"
         hardware_id = f"{sensor.product} {identity.serial_number}" if identity else ""
-        return diagnostics.to_status(name, hardware_id, *self._health(sensor), values)
+        return diagnostics.to_status(self.status_name(sensor.options.name), hardware_id,
+                                     *self._health(sensor), values)
 
     def _health(self, sensor: Sensor) -> tuple[bytes, str]:
         """Return level and message of the diagnostics."""

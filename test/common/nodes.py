@@ -42,6 +42,8 @@ from std_srvs.srv import Trigger
 
 DEADLINE = 15.0  # s; far more than anything takes, also on a busy machine
 OFTEN = "import driver_common.diagnostics as d; d.PERIOD = 0.1"  # s; the tests wait for them
+# A test run that is killed must leave no node behind that holds a port (prctl(2)).
+END_WITH_PARENT = "import ctypes; ctypes.CDLL(None).prctl(1, 15)"
 TRANSITIONS = {
     "configure": Transition.TRANSITION_CONFIGURE, "cleanup": Transition.TRANSITION_CLEANUP,
     "activate": Transition.TRANSITION_ACTIVATE, "deactivate": Transition.TRANSITION_DEACTIVATE}
@@ -60,7 +62,8 @@ class Process:
         self.lines = []
         self._news = threading.Condition()
         self._process = subprocess.Popen(
-            [sys.executable, "-c", f"{before}\nfrom {module} import main; main()", *arguments],
+            [sys.executable, "-c",
+             f"{END_WITH_PARENT}\n{before}\nfrom {module} import main; main()", *arguments],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
             env={**os.environ, "PYTHONUNBUFFERED": "1"})
         self._reader = threading.Thread(target=self._read)

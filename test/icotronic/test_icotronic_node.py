@@ -598,7 +598,7 @@ def test_the_states_of_the_lifecycle_are_those_of_the_sensor(ros, start, launch)
                         **{"adc.oversampling_rate": 1024}))
     node = ros.remote(NAME)
     assert node.state() == "unconfigured"
-    assert ros.wait_for_status("icotronic").message == "not configured"
+    assert ros.wait_for_status(STATUS).message == "not configured"
     assert node.names() & SETTINGS.keys() == set()
 
     for _ in range(2):
@@ -752,7 +752,7 @@ def test_a_server_that_goes_and_comes_back_is_waited_for(ros, start, launch):
     wait_until(lambda: network.streamed > 100)
     server.close()
     process.wait_for_line("nothing listens there; check host and port in can_options (waiting")
-    status = ros.wait_for_status("icotronic", lambda status: "nothing listens" in status.message)
+    status = ros.wait_for_status(STATUS, lambda status: "nothing listens" in status.message)
     assert status.level == ERROR
     response = ros.remote(NAME).trigger("scan")
     assert (response.success, response.message) == (False, "socketcand can0 is not open")

@@ -437,7 +437,7 @@ def test_a_setting_of_a_radar_that_was_never_there_says_so(ros, launch):
     result = ros.remote(NAME).set("output1.range_max", 1.0)
     assert not result.successful
     assert "/dev/ttyMissing" in result.reason
-    status = ros.wait_for_status("isys_radar", lambda status: status.level == ERROR)
+    status = ros.wait_for_status("isys_radar: radar", lambda status: status.level == ERROR)
     assert "/dev/ttyMissing" in status.message
     assert process.log.count("/dev/ttyMissing") == 1  # however often it was tried
 
@@ -784,7 +784,7 @@ def test_the_life_of_a_node_that_does_not_start_by_itself(ros, lab, launch):
     settings = settings_of(simulated.model).keys()
     for _ in range(2):
         assert radar.state() == "unconfigured"
-        status = ros.wait_for_status("isys_radar")
+        status = ros.wait_for_status("isys_radar: radar")
         assert (status.level, status.message) == (STALE, "not configured")
         assert not settings & radar.names()
         assert radar.change_state("configure")
@@ -846,7 +846,7 @@ def test_a_radar_that_is_unplugged_is_waited_for_and_found_again(ros, lab, launc
     wait_for_points(radar)
     line.close()
     process.wait_for_line("(waiting for it)")
-    status = ros.wait_for_status("isys_radar", lambda status: status.level == ERROR)
+    status = ros.wait_for_status("isys_radar: radar", lambda status: status.level == ERROR)
     assert link in status.message
     result = radar.set("output1.range_max", 1.0)
     assert not result.successful
@@ -935,7 +935,7 @@ def test_names_follow_a_namespace_and_remapping(ros, lab, launch):
     ros.wait_until(lambda: clouds)
     assert clouds[0].header.frame_id == "nose_link"
     assert ros.remote("/car/nose").get("output1.mode") == "digital"
-    assert ros.wait_for_status("nose: radar").hardware_id == "iSYS-4001 000001"
+    assert ros.wait_for_status("car/nose: radar").hardware_id == "iSYS-4001 000001"
     process.stop()
 
 

@@ -395,7 +395,7 @@ def test_deactivated_cleaned_up_and_back(simulated, uc4000, heard, ros):
     assert simulated["left"].measurements[-1] == begun
     assert uc4000.change_state("cleanup")
     assert "left.gain_db" not in uc4000.names()
-    assert ros.wait_for_status("uc4000").message == "not configured"
+    assert ros.wait_for_status("uc4000: left").message == "not configured"
     assert uc4000.change_state("configure")
     assert uc4000.change_state("activate")
     heard.next("left/range")
@@ -421,7 +421,7 @@ def test_unplugged_and_plugged_in_again(ros, tmp_path):
             heard.next()
             assert simulated.value("gain_db") == 60.0
             line.close()
-            status = ros.wait_for_status("tank", lambda status: status.level == ERROR)
+            status = ros.wait_for_status("tank: sensor", lambda status: status.level == ERROR)
             assert f"{link}: " in status.message
         process.stop()
 
@@ -452,7 +452,7 @@ def test_an_error_in_the_code_of_the_diagnostics_does_not_end_the_node(ros):
     before = f"import {UC4000} as node; node.Uc4000Node.status_of = lambda self, sensor: 1 / 0"
     arguments = "--ros-args", "-p", "serial_port:=sim://UC4000", "-r", "__node:=tank"
     with Process(UC4000, *arguments, before=before):
-        status = ros.wait_for_status("tank", lambda status: "report it" in status.message)
+        status = ros.wait_for_status("tank: sensor", lambda status: "report it" in status.message)
         assert status.message.startswith("internal error, please report it: ZeroDivisionError")
         Heard(ros, "/tank").several("range", 3)
 

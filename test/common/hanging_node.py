@@ -1,0 +1,38 @@
+"""A node whose bus hangs until it is told to go on; for the test of the diagnostics."""
+
+import math
+import sys
+
+from driver_common import diagnostics
+from driver_common.device import Device, DeviceOptions
+from driver_common.device_bus import DeviceBus, Listener
+from driver_common.device_node import DeviceNode, run
+
+
+class HangingBus(DeviceBus):
+    """A bus of which the first step ends when a line comes from the standard input."""
+
+    told = ""
+
+    def _open_link(self):
+        pass
+
+    def close(self):
+        pass
+
+    def poll(self):
+        self.told = self.told or sys.stdin.readline()
+        return math.inf
+
+
+class HangingNode(DeviceNode, Listener):
+    def make_bus(self):
+        return HangingBus([Device(DeviceOptions(name)) for name in self.sensors], self)
+
+    def status_of(self, device):
+        return diagnostics.to_status(self.status_name(device.options.name), "", diagnostics.OK,
+                                     "well", {})
+
+
+def main():
+    run(lambda: HangingNode("hanging"))
