@@ -238,7 +238,7 @@ class IsysRadarNode(DeviceNode, Listener):
 
     def _saved(self, radar: Radar, command: Command[None]) -> str:
         """Save, and return what was saved; in the thread of the bus, which owns the values."""
-        names = ", ".join(self.bus.save(radar, command))
+        names = ", ".join(self.bus.maintenance.save(radar, command))
         assert radar.model is not None
         nothing = "saved" if radar.model.supports(command) else "nothing to save"
         saved = f"saved; changed before: {names}" if names else nothing
@@ -250,7 +250,7 @@ class IsysRadarNode(DeviceNode, Listener):
     def _preview(self, radar: Radar) -> str:
         """Return what saving all would change; in the thread of the bus."""
         command = commands.SAVE_ALL_SETTINGS
-        stored = self.bus.stored_values(radar)
+        stored = self.bus.maintenance.stored_values(radar)
 
         def text(name: str, value: Value) -> str:
             return radar.settings[name].text(value)
@@ -258,29 +258,30 @@ class IsysRadarNode(DeviceNode, Listener):
         lines = [f"{name}: {text(name, value)} → {text(name, radar.values[name])}"
                  for name, value in stored.items() if value != radar.values[name]]
         lines += [f"{name}: now {text(name, radar.values[name])}"
-                  for name in self.bus.unsaved(radar, command) if name not in stored]
+                  for name in self.bus.maintenance.unsaved(radar, command) if name not in stored]
         return ("saving would change " + ("; ".join(lines) if lines else "nothing that is known")
                 + self._not_savable(radar, command))
 
     def _not_savable(self, radar: Radar, command: Command[None]) -> str:
-        names = ", ".join(self.bus.unsaved(radar, command, possible=False))
+        names = ", ".join(self.bus.maintenance.unsaved(radar, command, possible=False))
         product = radar.product
         return f"; the {product} cannot store {names}: lost at power-off" if names else ""
 
     def _restore_factory_settings(self, radar: Radar) -> str:
-        self.call(lambda: self.bus.restore_factory_settings(radar))
+        self.call(lambda: self.bus.maintenance.restore_factory_settings(radar))
         return "factory settings restored, in RAM and EEPROM"
 
     def _set_default_thresholds(self, radar: Radar) -> str:
-        thresholds = self.call(lambda: self.bus.set_default_thresholds(radar))
+        thresholds = self.call(lambda: self.bus.maintenance.set_default_thresholds(radar))
         return "temperature thresholds are " + ", ".join(f"{value:g} °C" for value in thresholds)
 
     def _change_address(self, radar: Radar) -> str:
+        maintenance = self.bus.maintenance
         return self.give_address(radar.options.name,
-                                 lambda address: self.bus.change_address(radar, address))
+                                 lambda address: maintenance.change_address(radar, address))
 
     def _read_raw_signals(self, radar: Radar) -> str:
-        raw = self.call(lambda: self.bus.read_raw_signals(radar))
+        raw = self.call(lambda: self.bus.maintenance.read_raw_signals(radar))
         self._publish(radar, "raw_signals", to_float32_multi_array(
             raw.samples, ["signal", f"sample, {raw.sample_time:g} s apart"]))
         signals, samples = raw.samples.shape
@@ -342,7 +343,7 @@ class IsysRadarNode(DeviceNode, Listener):
         expected = 1 / radar.cycle_time
         if len(radar.arrivals) < 3 or radar.rate >= 0.9 * expected:
             return diagnostics.OK, message
-        if len(self.bus.devices) > 1 and radar.rate >= 0.9 * self.bus.least_rate(radar):
+        if len(self.bus.devices) > 1 and radar.rate >= 0.9 * self.bus.acquisition.least_rate(radar):
             return diagnostics.OK, f"{message}, shared line ({expected:.1f} alone)"
         return diagnostics.WARN, f"{message} instead of {expected:.1f}"
 

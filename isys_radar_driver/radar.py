@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from driver_common.device import Device, DeviceOptions
+from driver_common.errors import NoAnswerError
 from driver_common.serial_link import BITS_PER_BYTE
 from driver_common.settings import RecordAccess, Value
 from isys_radar_driver.commands import Version
@@ -162,6 +163,13 @@ class Radar(Device):
         return self.identity.model if self.identity else None
 
     @property
+    def known_model(self) -> Model:
+        """The connected model; raises NoAnswerError where none is."""
+        if self.identity is None:
+            raise NoAnswerError(f"{self} is not connected")
+        return self.identity.model
+
+    @property
     def sends_lists(self) -> bool:
         """Whether it measures, and hands out target lists over its serial port."""
         return bool(self.measuring) and self.model is not None and self.model.has_target_lists
@@ -220,8 +228,7 @@ class Radar(Device):
         Raises:
             SettingError: The model does not have the resolution that was asked for.
         """
-        assert self.model is not None
-        possible = self.model.resolutions_of(self.options.resolution)
+        possible = self.known_model.resolutions_of(self.options.resolution)
         for resolution in possible:
             seconds = self.list_size(resolution) * BITS_PER_BYTE / baud_rate
             if seconds * sharing < self.cycle_time:

@@ -52,6 +52,7 @@ class Master(BusMaster):
         heard = Recorder()
         super().__init__(RadarBus(port, baud_rate, options or [Options()], heard), heard)
         self.radar = self.device
+        self.maintenance = self.bus.maintenance
         self.bus.open()
 
     def measure(self, count=1):

@@ -22,7 +22,7 @@ from isys_master import (
 
 from driver_common.device_thread import DeviceThread
 from driver_common.errors import FrameError, LinkError, NoAnswerError, RefusedError
-from isys_radar_driver import commands, session
+from isys_radar_driver import acquisition, commands, connection
 from isys_radar_driver import line as isys_line
 from isys_radar_driver.commands import Location
 from isys_radar_driver.frames import FAILURE, MASTER, Frame, FrameParser
@@ -51,7 +51,7 @@ def connect(lab):
 
 def test_after_a_power_cycle_the_settings_are_applied_again(connect):
     master, _, simulated = connect(wanted={"output1.range_max": 42.0})
-    master.bus.write(master.radar, {"frequency_channel": 3})
+    master.maintenance.write(master.radar, {"frequency_channel": 3})
     master.measure()
     simulated.power_cycle()
     assert simulated.value("output1.range_max") == 150.0
@@ -82,7 +82,7 @@ def self_starting(connect):
 def test_a_radar_that_measures_on_after_a_reset_is_noticed_by_its_settings(
         self_starting, monkeypatch):
     master, _, simulated = self_starting
-    monkeypatch.setattr(session, "CHECK_PERIOD", 0.3)
+    monkeypatch.setattr(connection, "CHECK_PERIOD", 0.3)
     master.until(lambda: master.radar.checks > 1)
     simulated.power_cycle(now=-math.inf)  # it answers again at once
     master.until(lambda: simulated.value("output1.range_max") == 42.0)
@@ -110,7 +110,7 @@ def test_after_a_silence_the_settings_are_looked_at_before_a_list_is_taken(self_
                                              ("iSYS-6003", True), ("iSYS-6006", False)])
 def test_a_radar_is_checked_while_it_measures_where_that_costs_no_cycle(connect, model, fits):
     master, *_ = connect(model, baud_rate=0)
-    assert master.bus._is_check_due(master.radar) == fits
+    assert master.bus.connection.is_check_due(master.radar) == fits
 
 
 # --- refusals ----------------------------------------------------------------------------------
@@ -158,12 +158,12 @@ def test_a_radar_that_cannot_be_configured_again_is_found_anew(self_starting):
 
 @pytest.mark.parametrize("name", ["iSYS-4001", "iSYS-5010", "iSYS-5020", "iSYS-5110"])
 def test_a_reset_without_notice_is_noticed_while_the_radar_is_idle(connect, monkeypatch, name):
-    monkeypatch.setattr(session, "KEEP_ALIVE", 0.02)
+    monkeypatch.setattr(connection, "KEEP_ALIVE", 0.02)
     master, _, simulated = connect(name)
     setting = {"iSYS-4001": "output1.range_max", "iSYS-5010": "moving_target_sensitivity.near_db",
                "iSYS-5020": "moving_target_sensitivity.near_db",
                "iSYS-5110": "stop_bar_zone1.range_max"}[name]
-    master.bus.write(master.radar, {setting: 9.0})
+    master.maintenance.write(master.radar, {setting: 9.0})
     simulated.power_cycle(now=-math.inf)
     master.until(lambda: simulated.value(setting) == 9.0)
 
@@ -263,7 +263,7 @@ def test_settings_arrive_over_a_bad_line(connect):
     for _ in range(12):
         value = round(generator.uniform(1, 150), 1)
         try:
-            reported = master.bus.write(master.radar, {"output1.range_max": value})
+            reported = master.maintenance.write(master.radar, {"output1.range_max": value})
         except (NoAnswerError, FrameError):
             master.find()  # it was lost with the answer
             continue
@@ -274,7 +274,7 @@ def test_settings_arrive_over_a_bad_line(connect):
 def sensitivity(master, side):
     """Read one of two settings whose replies look alike, once."""
     record = master.radar.settings[f"threshold_sensitivity.{side}_db"].record
-    return master.bus.read_record(master.radar, record, Location.RAM)
+    return master.bus.access.read_record(master.radar, record, Location.RAM)
 
 
 @pytest.fixture
@@ -299,7 +299,7 @@ def test_a_late_reply_is_not_taken_for_the_answer_to_the_next_request(late):
     stale = master.bus.line.stale_frames
     record = master.radar.settings["threshold_sensitivity.left_db"].record
     with pytest.raises(NoAnswerError):
-        master.bus._exchange(master.radar, record.read_request(128), lambda frame: frame,
+        master.bus.access.exchange(master.radar, record.read_request(128), lambda frame: frame,
                              isys_line.REPLY_TIMEOUT, attempts=1)
     assert sensitivity(master, "right") == (20,)  # the late one says 10, in the same form
     assert master.bus.line.stale_frames > stale
@@ -311,7 +311,7 @@ def test_a_late_refusal_is_not_taken_for_the_answer_to_the_next_request(late):
     simulated.refuse.add(commands.READ_SENSOR)
     record = master.radar.settings["threshold_sensitivity.left_db"].record
     with pytest.raises(NoAnswerError):
-        master.bus._exchange(master.radar, record.read_request(128), lambda frame: frame,
+        master.bus.access.exchange(master.radar, record.read_request(128), lambda frame: frame,
                              isys_line.REPLY_TIMEOUT, attempts=1)
     simulated.refuse.clear()
     assert sensitivity(master, "right") == (20,)
@@ -367,7 +367,7 @@ def test_a_reply_from_another_address_is_not_accepted(connect):
 def test_the_echo_of_our_own_bytes_is_no_reply(connect):
     master, line, simulated = connect()
     line.faults.echo = True
-    master.bus.write(master.radar, {"output1.range_max": 12.0})
+    master.maintenance.write(master.radar, {"output1.range_max": 12.0})
     assert simulated.value("output1.range_max") == 12.0
     master.measure(8)
     assert master.bus.line.stale_frames < 8
@@ -432,7 +432,7 @@ def test_a_radar_that_starts_again_finds_its_turn(start):
 
 
 def test_radars_whose_clocks_drifted_together_are_parted_again(start, monkeypatch):
-    monkeypatch.setattr(session, "REALIGN_PERIOD", 0.5)
+    monkeypatch.setattr(acquisition, "REALIGN_PERIOD", 0.5)
     master, first, second = two_radars(start)
     master.measure(4)
     second.started = first.started
@@ -447,9 +447,9 @@ def test_cycles_that_the_line_leaves_to_another_radar_are_not_lost(start, monkey
     master.lists(20)
     assert sum(radar.statistics.shared_cycles for radar in master.bus.devices) > 10
     assert sum(radar.statistics.lost_cycles for radar in master.bus.devices) < 3
-    assert master.bus.least_rate(master.radar) == pytest.approx(1 / 0.15)
+    assert master.bus.acquisition.least_rate(master.radar) == pytest.approx(1 / 0.15)
     for radar in master.bus.devices:
-        assert radar.rate > 0.8 * master.bus.least_rate(radar)
+        assert radar.rate > 0.8 * master.bus.acquisition.least_rate(radar)
 
 
 def test_a_silent_radar_is_asked_more_and_more_rarely_and_returns_by_itself(start):
@@ -478,6 +478,6 @@ def test_a_silent_radar_is_asked_more_and_more_rarely_and_returns_by_itself(star
 def test_settings_go_to_the_radar_that_is_meant(start):
     line, first, second = start("iSYS-4001", addresses=[10, 11])
     master = Master(line.port, Options("front", address=10), Options("rear", address=11)).find()
-    master.bus.write(master.bus.devices[1], {"output1.range_max": 12.0})
+    master.maintenance.write(master.bus.devices[1], {"output1.range_max": 12.0})
     assert first.value("output1.range_max") == 150.0
     assert second.value("output1.range_max") == 12.0

@@ -21,7 +21,7 @@ from isys_master import (
 
 from driver_common.errors import NoAnswerError, RefusedError, SettingError, WrongDeviceError
 from driver_common.simulator.line import Faults
-from isys_radar_driver import commands, session
+from isys_radar_driver import access, commands, connection, maintenance
 from isys_radar_driver.commands import Location
 from isys_radar_driver.frames import FAILURE, MASTER, Frame
 from isys_radar_driver.models import MODELS, find_model
@@ -239,7 +239,7 @@ def test_every_setting_takes_both_ends_of_its_range(connect, name):
     master, _, simulated = connect(name)
     low, high = both_ends(master.radar.settings)
     for values in (high, low):
-        assert master.bus.write(master.radar, values) == values
+        assert master.maintenance.write(master.radar, values) == values
         assert {name: simulated.value(name) for name in values} == values
         assert {name: master.radar.values[name] for name in values} == values
 
@@ -250,13 +250,14 @@ def test_every_setting_can_be_written_alone(connect, name):
     low, high = both_ends(master.radar.settings)
     for name in low:  # a smallest value goes down first and its largest up first
         for values in (low, high) if "_max" in name else (high, low):
-            assert master.bus.write(master.radar, {name: values[name]}) == {name: values[name]}
+            change = {name: values[name]}
+            assert master.maintenance.write(master.radar, change) == change
             assert simulated.value(name) == values[name]
 
 
 def test_a_value_is_rounded_to_what_the_device_can_hold(connect):
     master, _, simulated = connect()
-    reported = master.bus.write(master.radar, {"output1.range_max": 12.34,
+    reported = master.maintenance.write(master.radar, {"output1.range_max": 12.34,
                                                "threshold_minimum_db": -1.26})
     assert reported == {"output1.range_max": 12.3, "threshold_minimum_db": -1.3}
     assert simulated.value("output1.range_max") == 12.3
@@ -264,10 +265,10 @@ def test_a_value_is_rounded_to_what_the_device_can_hold(connect):
 
 def test_a_minimum_above_the_old_maximum_is_written_together_with_the_new_one(connect):
     master, _, simulated = connect()
-    master.bus.write(master.radar, {"output1.range_min": 1.0, "output1.range_max": 5.0})
-    master.bus.write(master.radar, {"output1.range_min": 20.0, "output1.range_max": 30.0})
+    master.maintenance.write(master.radar, {"output1.range_min": 1.0, "output1.range_max": 5.0})
+    master.maintenance.write(master.radar, {"output1.range_min": 20.0, "output1.range_max": 30.0})
     assert simulated.value("output1.range_min") == 20.0
-    master.bus.write(master.radar, {"output1.range_max": 5.0, "output1.range_min": 1.0})
+    master.maintenance.write(master.radar, {"output1.range_max": 5.0, "output1.range_min": 1.0})
     assert simulated.value("output1.range_max") == 5.0
 
 
@@ -275,7 +276,7 @@ def test_a_refusal_is_told_with_the_value_and_nothing_changes(connect):
     master, _, simulated = connect()
     before = dict(simulated.ram)
     with pytest.raises(RefusedError) as caught:
-        master.bus.write(master.radar, {"output1.rising_delay_cycles": 7,
+        master.maintenance.write(master.radar, {"output1.rising_delay_cycles": 7,
                                         "output1.range_max": 10.0, "output1.range_min": 20.0})
     assert "output1.range_min = 20 m" in str(caught.value)
     assert "0xFD" in str(caught.value)
@@ -284,7 +285,7 @@ def test_a_refusal_is_told_with_the_value_and_nothing_changes(connect):
 
 
 def test_after_a_write_without_an_answer_the_radar_is_read_again(connect, monkeypatch):
-    monkeypatch.setattr(session, "EEPROM_TIMEOUT", 0.1)
+    monkeypatch.setattr(access, "EEPROM_TIMEOUT", 0.1)
     master, line, simulated = connect()
 
     def deaf(due, reply):  # it takes the value, and its acknowledge and all else gets lost
@@ -293,7 +294,7 @@ def test_after_a_write_without_an_answer_the_radar_is_read_again(connect, monkey
 
     line.faults = Script(deaf)
     with pytest.raises(NoAnswerError):
-        master.bus.write(master.radar, {"output1.range_max": 10.0})
+        master.maintenance.write(master.radar, {"output1.range_max": 10.0})
     assert isinstance(master.heard.lost[0][1], NoAnswerError)
     line.faults = Faults()
     master.find()
@@ -311,7 +312,7 @@ def test_what_is_wrong_is_not_sent(connect, name, value, words):
     master, _, simulated = connect()
     requests = counted_requests(simulated)
     with pytest.raises(SettingError) as caught:
-        master.bus.write(master.radar, {name: value})
+        master.maintenance.write(master.radar, {name: value})
     assert words in str(caught.value)
     assert not requests
 
@@ -319,13 +320,13 @@ def test_what_is_wrong_is_not_sent(connect, name, value, words):
 def test_a_setting_that_can_be_read_only_is_not_written(connect):
     master, _, _ = connect("iSYS-6005")
     with pytest.raises(SettingError, match="measurement_mode can be read only"):
-        master.bus.write(master.radar, {"measurement_mode": "fast"})
+        master.maintenance.write(master.radar, {"measurement_mode": "fast"})
 
 
 def test_a_setting_that_already_is_as_wanted_is_not_written(connect):
     master, _, simulated = connect()
     simulated.refuse.add(commands.READ_APPLICATION + 1)
-    assert master.bus.write(master.radar, {"output1.range_max": 150.0}) == {
+    assert master.maintenance.write(master.radar, {"output1.range_max": 150.0}) == {
         "output1.range_max": 150.0}
 
 
@@ -334,7 +335,7 @@ def test_a_value_that_the_device_took_but_does_not_hold_is_an_error(connect):
     written = simulated._write_record
     simulated._write_record = lambda *arguments: b""  # acknowledges, and forgets
     with pytest.raises(RefusedError, match="reports 150 m"):
-        master.bus.write(master.radar, {"output1.range_max": 10.0})
+        master.maintenance.write(master.radar, {"output1.range_max": 10.0})
     simulated._write_record = written
 
 
@@ -344,7 +345,7 @@ def test_a_setting_that_needs_it_stops_the_acquisition_and_starts_it_again(
         connect, model, name, value):
     master, _, simulated = connect(model)
     master.measure()
-    assert master.bus.write(master.radar, {name: value}) == {name: value}
+    assert master.maintenance.write(master.radar, {name: value}) == {name: value}
     assert simulated.value(name) == value
     assert simulated.measuring
     assert master.radar.measuring
@@ -356,7 +357,7 @@ def test_another_setting_leaves_the_acquisition_running(connect):
     master, _, simulated = connect()
     master.measure()
     simulated.refuse.add(0xD1)  # start and stop
-    master.bus.write(master.radar, {"output1.range_max": 10.0})
+    master.maintenance.write(master.radar, {"output1.range_max": 10.0})
     simulated.refuse.clear()
     assert simulated.measuring
 
@@ -366,7 +367,7 @@ def test_after_a_refusal_the_acquisition_runs_again(connect):
     master.measure()
     simulated.refuse.add(commands.READ_SENSOR + 1)
     with pytest.raises(RefusedError):
-        master.bus.write(master.radar, {"measurement_mode": "fast"})
+        master.maintenance.write(master.radar, {"measurement_mode": "fast"})
     assert simulated.measuring
     master.measure(2)
 
@@ -375,14 +376,14 @@ def test_the_measurement_mode_changes_cycle_time_and_targets(connect):
     master, _, _ = connect("iSYS-6003")
     assert len(master.measure()[0].targets) == 3
     assert (master.radar.cycle_time, master.radar.max_targets) == (0.2, 30)
-    master.bus.write(master.radar, {"measurement_mode": "fast"})
+    master.maintenance.write(master.radar, {"measurement_mode": "fast"})
     assert len(master.measure()[0].targets) == 1
     assert (master.radar.cycle_time, master.radar.max_targets) == (0.05, 1)
 
 
 def test_what_the_device_stores_at_once_is_not_unsaved(connect):
     master, _, simulated = connect()
-    master.bus.write(master.radar, {"led": "disabled", "output1.range_max": 10.0})
+    master.maintenance.write(master.radar, {"led": "disabled", "output1.range_max": 10.0})
     assert simulated.value("led", Location.EEPROM) == "disabled"
     assert master.radar.unsaved == {"output1.range_max"}
 
@@ -437,7 +438,8 @@ def test_a_setting_that_was_written_counts_although_the_start_is_refused(connect
         return (now, Frame(MASTER, 128, FAILURE)) if refused else reply(request, now)
 
     simulated.reply = no_start
-    assert master.bus.write(master.radar, {"frequency_channel": 5}) == {"frequency_channel": 5}
+    change = {"frequency_channel": 5}
+    assert master.maintenance.write(master.radar, change) == change
     simulated.reply = reply
     master.lists()
 
@@ -628,7 +630,7 @@ def test_the_list_has_passed_the_filter_of_the_output_asked_for(connect, output)
 def test_digital_outputs_are_read_after_each_list(connect):
     master, _, simulated = connect(read_digital_outputs=True)
     simulated.scene = lambda now: [Target(40.0, 1.0, 7.5, 0.0)]
-    master.bus.write(master.radar, {"output2.mode": "pwm", "output3.mode": "digital",
+    master.maintenance.write(master.radar, {"output2.mode": "pwm", "output3.mode": "digital",
                                     "output3.range_max": 5.0})
     master.measure(2)
     assert master.heard.digital_outputs[0] == (1, 750, 0)
@@ -658,7 +660,7 @@ def test_a_model_without_them_is_not_asked_for_more_than_lists(connect):
 def test_raw_signals(connect, model, kind):
     master, _, _ = connect(model)
     master.bus.set_active(True)
-    raw = master.bus.read_raw_signals(master.radar)
+    raw = master.maintenance.read_raw_signals(master.radar)
     assert raw.sample_time == pytest.approx(25e-6)
     assert raw.samples.dtype == kind
     assert raw.samples.shape == (4, 512)
@@ -670,10 +672,10 @@ def test_raw_signals(connect, model, kind):
 
 def test_cycles_without_a_list_because_of_raw_signals_are_not_lost(connect):
     master, _, _ = connect("iSYS-6003", baud_rate=0)
-    master.bus.write(master.radar, {"measurement_mode": "fast"})
+    master.maintenance.write(master.radar, {"measurement_mode": "fast"})
     master.measure()
     lost = master.radar.statistics.lost_cycles
-    master.bus.read_raw_signals(master.radar)  # takes 8 cycles
+    master.maintenance.read_raw_signals(master.radar)  # takes 8 cycles
     master.lists()
     assert master.radar.statistics.lost_cycles == lost
 
@@ -681,14 +683,14 @@ def test_cycles_without_a_list_because_of_raw_signals_are_not_lost(connect):
 def test_raw_signals_need_the_acquisition(connect):
     master, _, _ = connect("iSYS-6003")
     with pytest.raises(SettingError, match="start it first"):
-        master.bus.read_raw_signals(master.radar)
+        master.maintenance.read_raw_signals(master.radar)
 
 
 def test_a_model_without_raw_signals_says_so(connect):
     master, _, _ = connect()
     master.measure()
     with pytest.raises(SettingError, match="iSYS-4001 cannot read the raw signals"):
-        master.bus.read_raw_signals(master.radar)
+        master.maintenance.read_raw_signals(master.radar)
 
 
 def test_acquisition_of_one_radar_can_be_stopped_and_started(connect):
@@ -716,7 +718,7 @@ def test_a_radar_that_misses_start_or_stop_is_told_again(connect, active):
 
 @pytest.mark.parametrize("model", ["iSYS-5010", "iSYS-5011", "iSYS-5020", "iSYS-5021", "iSYS-5110"])
 def test_a_model_without_target_lists_is_not_asked_for_them(connect, monkeypatch, model):
-    monkeypatch.setattr(session, "KEEP_ALIVE", 0.02)
+    monkeypatch.setattr(connection, "KEEP_ALIVE", 0.02)
     master, _, simulated = connect(model)
     requests = counted_requests(simulated)
     master.bus.set_active(True)
@@ -782,17 +784,18 @@ def test_a_list_that_is_lost_on_the_line_is_a_lost_cycle(connect):
 
 def test_default_temperature_thresholds(connect):
     master, _, simulated = connect("iSYS-6203")
-    master.bus.write(master.radar, {"output1.temperature_threshold_celsius": 30.0})
+    master.maintenance.write(master.radar, {"output1.temperature_threshold_celsius": 30.0})
     command = commands.SET_DEFAULT_TEMPERATURE_THRESHOLDS
-    assert master.bus.execute(master.radar, command) == pytest.approx((55.0, 60.0, 0.0))
+    assert master.maintenance.execute(master.radar, command) == pytest.approx((55.0, 60.0, 0.0))
     assert simulated.value("output1.temperature_threshold_celsius") == 55.0
 
 
 def test_default_temperature_thresholds_stay_until_others_are_set(connect):
     name = "output1.temperature_threshold_celsius"
     master, _, simulated = connect("iSYS-6203", wanted={name: 30.0})
-    master.bus.save(master.radar, commands.SAVE_ALL_SETTINGS)
-    assert master.bus.set_default_thresholds(master.radar) == pytest.approx((55.0, 60.0, 0.0))
+    master.maintenance.save(master.radar, commands.SAVE_ALL_SETTINGS)
+    thresholds = master.maintenance.set_default_thresholds(master.radar)
+    assert thresholds == pytest.approx((55.0, 60.0, 0.0))
     assert master.radar.values[name] == master.heard.values[-1][name] == 55.0
     assert master.radar.unsaved == {name}
     simulated.power_cycle()
@@ -804,7 +807,7 @@ def test_a_command_that_the_model_lacks_is_not_sent(connect):
     master, _, simulated = connect()
     requests = counted_requests(simulated)
     with pytest.raises(SettingError, match="iSYS-4001 cannot set the default temperature"):
-        master.bus.execute(master.radar, commands.SET_DEFAULT_TEMPERATURE_THRESHOLDS)
+        master.maintenance.execute(master.radar, commands.SET_DEFAULT_TEMPERATURE_THRESHOLDS)
     assert not requests
 
 
@@ -816,9 +819,9 @@ def test_a_command_that_the_model_lacks_is_not_sent(connect):
 def test_saving_keeps_the_settings_over_a_power_cycle(connect, command, saved):
     master, _, simulated = connect()
     changes = {"frequency_channel": 4, "output1.range_max": 33.0, "threshold_minimum_db": 5.5}
-    master.bus.write(master.radar, changes)
+    master.maintenance.write(master.radar, changes)
     assert simulated.eeprom != simulated.ram
-    assert master.bus.save(master.radar, command) == saved
+    assert master.maintenance.save(master.radar, command) == saved
     assert master.radar.unsaved == changes.keys() - set(saved)
     for name, value in changes.items():
         assert (simulated.value(name, Location.EEPROM) == value) == (name in saved)
@@ -839,16 +842,16 @@ def test_without_a_command_to_save_each_record_is_written_to_the_eeprom(connect,
     master, _, simulated = connect(model)
     sensor, application = LOCATED[model]
     changes = {"frequency_channel": 2, **sensor, **application}
-    master.bus.write(master.radar, changes)
+    master.maintenance.write(master.radar, changes)
     kept = {**(sensor if command is not commands.SAVE_APPLICATION_SETTINGS else {}),
             **(application if command is not commands.SAVE_SENSOR_SETTINGS else {})}
     master.bus.set_active(True)
-    assert master.bus.unsaved(master.radar, command) == sorted(kept)
+    assert master.maintenance.unsaved(master.radar, command) == sorted(kept)
     if kept:
-        assert master.bus.save(master.radar, command) == sorted(kept)
+        assert master.maintenance.save(master.radar, command) == sorted(kept)
     else:
         with pytest.raises(SettingError, match=f"{model} cannot save the sensor settings"):
-            master.bus.save(master.radar, command)
+            master.maintenance.save(master.radar, command)
     assert simulated.measuring
     assert master.radar.unsaved == changes.keys() - kept.keys()
     for name in changes:
@@ -857,8 +860,8 @@ def test_without_a_command_to_save_each_record_is_written_to_the_eeprom(connect,
 
 def test_what_no_command_can_save_is_named(connect):
     master, _, _ = connect("iSYS-5010")
-    master.bus.write(master.radar, {"frequency_channel": 2, "rcs_output": True})
-    named = {possible: master.bus.unsaved(master.radar, commands.SAVE_ALL_SETTINGS,
+    master.maintenance.write(master.radar, {"frequency_channel": 2, "rcs_output": True})
+    named = {possible: master.maintenance.unsaved(master.radar, commands.SAVE_ALL_SETTINGS,
                                           possible=possible) for possible in (True, False)}
     assert named == {True: ["rcs_output"], False: ["frequency_channel"]}
 
@@ -869,8 +872,8 @@ def test_only_what_the_eeprom_does_not_hold_yet_is_written_to_it(connect):
     written = []
     write = simulated._write_record
     simulated._write_record = lambda *request: written.append(request) or write(*request)
-    assert master.bus.save(master.radar, commands.SAVE_ALL_SETTINGS) == ["ip.gateway"]
-    assert master.bus.save(master.radar, commands.SAVE_ALL_SETTINGS) == []
+    assert master.maintenance.save(master.radar, commands.SAVE_ALL_SETTINGS) == ["ip.gateway"]
+    assert master.maintenance.save(master.radar, commands.SAVE_ALL_SETTINGS) == []
     assert len(written) == 1
 
 
@@ -881,38 +884,38 @@ def test_only_what_the_eeprom_does_not_hold_yet_is_written_to_it(connect):
      "took rcs_output but did not store it")])
 def test_a_record_that_is_not_stored_is_named(connect, spoil, words):
     master, _, simulated = connect("iSYS-5010")
-    master.bus.write(master.radar, {"rcs_output": True})
+    master.maintenance.write(master.radar, {"rcs_output": True})
     spoil(simulated)
     with pytest.raises(RefusedError, match=re.escape(words)):
-        master.bus.save(master.radar, commands.SAVE_ALL_SETTINGS)
+        master.maintenance.save(master.radar, commands.SAVE_ALL_SETTINGS)
     assert master.radar.unsaved == {"rcs_output"}
 
 
 def test_writing_a_setting_leaves_the_eeprom_alone(connect):
     master, _, simulated = connect("iSYS-6203")
     eeprom = dict(simulated.eeprom)
-    master.bus.write(master.radar, both_ends(master.radar.settings)[0])
+    master.maintenance.write(master.radar, both_ends(master.radar.settings)[0])
     assert simulated.ram != eeprom
     assert simulated.eeprom == eeprom
 
 
 def test_what_the_eeprom_holds_can_be_read_where_the_manual_has_a_location(connect):
     master, _, _ = connect("iSYS-6203")
-    master.bus.write(master.radar, {"output1.temperature_threshold_celsius": 30.0,
+    master.maintenance.write(master.radar, {"output1.temperature_threshold_celsius": 30.0,
                                     "output2.range_warning": 1.5})
-    stored = master.bus.stored_values(master.radar)
+    stored = master.maintenance.stored_values(master.radar)
     assert stored["output1.temperature_threshold_celsius"] == 55.0
     assert stored["output2.range_warning"] == 0.0
     assert "output1.range_max" not in stored
-    master.bus.save(master.radar, commands.SAVE_ALL_SETTINGS)
-    assert master.bus.stored_values(master.radar)["output2.range_warning"] == 1.5
+    master.maintenance.save(master.radar, commands.SAVE_ALL_SETTINGS)
+    assert master.maintenance.stored_values(master.radar)["output2.range_warning"] == 1.5
 
 
 @pytest.mark.parametrize("name", ["iSYS-5010", "iSYS-5020", "iSYS-5110", "iSYS-6203"])
 def test_every_setting_with_a_location_is_read_from_there(connect, name):
     master, _, simulated = connect(name)
-    master.bus.write(master.radar, both_ends(master.radar.settings)[1])
-    stored = master.bus.stored_values(master.radar)
+    master.maintenance.write(master.radar, both_ends(master.radar.settings)[1])
+    stored = master.maintenance.stored_values(master.radar)
     assert stored == {name: simulated.value(name, Location.EEPROM) for name in stored}
     assert stored
 
@@ -920,8 +923,8 @@ def test_every_setting_with_a_location_is_read_from_there(connect, name):
 def test_factory_settings_are_restored_and_read_again(connect):
     master, _, simulated = connect(wanted={"output1.range_max": 42.0})
     master.measure()
-    master.bus.save(master.radar, commands.SAVE_ALL_SETTINGS)
-    master.bus.restore_factory_settings(master.radar)
+    master.maintenance.save(master.radar, commands.SAVE_ALL_SETTINGS)
+    master.maintenance.restore_factory_settings(master.radar)
     assert simulated.value("output1.range_max", Location.EEPROM) == 150.0
     assert master.heard.values[-1]["output1.range_max"] == 150.0
     assert master.radar.values["output1.range_max"] == 150.0
@@ -932,7 +935,7 @@ def test_factory_settings_are_restored_and_read_again(connect):
 
 def test_factory_settings_stay_after_a_reconnection(connect):
     master, _, simulated = connect(wanted={"output1.range_max": 42.0})
-    master.bus.restore_factory_settings(master.radar)
+    master.maintenance.restore_factory_settings(master.radar)
     master.bus.close()
     master.bus.open()
     master.find()
@@ -953,7 +956,7 @@ def test_an_address_that_factory_settings_bring_back_is_followed(start, acknowle
         return due, frame
 
     simulated.reply = with_address
-    master.bus.restore_factory_settings(master.radar)
+    master.maintenance.restore_factory_settings(master.radar)
     assert master.radar.address == 128
     master.measure(2)
     master.bus.close()
@@ -964,7 +967,7 @@ def test_an_address_that_factory_settings_bring_back_is_followed(start, acknowle
 def test_a_new_address_is_followed(connect):
     master, _, simulated = connect()
     master.measure()
-    master.bus.change_address(master.radar, 42)
+    master.maintenance.change_address(master.radar, 42)
     assert simulated.address == 42
     assert master.radar.address == 42
     master.measure(2)
@@ -975,7 +978,7 @@ def test_a_new_address_is_followed(connect):
 
 
 def test_a_new_address_is_followed_when_its_acknowledgement_is_lost(connect, monkeypatch):
-    monkeypatch.setattr(session, "EEPROM_TIMEOUT", 0.1)
+    monkeypatch.setattr(maintenance, "EEPROM_TIMEOUT", 0.1)
     master, line, simulated = connect()
     lost = []
 
@@ -986,7 +989,7 @@ def test_a_new_address_is_followed_when_its_acknowledgement_is_lost(connect, mon
         return [(due, reply)]
 
     line.faults = Script(lose_first)
-    master.bus.change_address(master.radar, 42)
+    master.maintenance.change_address(master.radar, 42)
     assert lost
     assert master.radar.address == 42
     master.measure(2)
@@ -996,7 +999,7 @@ def test_a_new_address_is_followed_when_its_acknowledgement_is_lost(connect, mon
 def test_an_address_that_no_device_may_have_is_not_sent(connect, address):
     master, _, simulated = connect()
     with pytest.raises(SettingError, match=f"address {address} is out of range.*2 … 255"):
-        master.bus.change_address(master.radar, address)
+        master.maintenance.change_address(master.radar, address)
     assert simulated.address == 128
 
 
@@ -1004,7 +1007,7 @@ def test_an_address_of_another_radar_of_this_driver_is_not_given_away(start):
     line, first, _ = start("iSYS-4001", addresses=[10, 11])
     master = Master(line.port, Options("front", address=10), Options("rear", address=11)).find()
     with pytest.raises(SettingError, match="address 11 belongs to another radar"):
-        master.bus.change_address(master.bus.devices[0], 11)
+        master.maintenance.change_address(master.bus.devices[0], 11)
     assert first.address == 10
 
 
@@ -1012,7 +1015,7 @@ def test_an_address_that_another_device_has_is_not_given_away(start):
     line, first, _ = start("iSYS-4001", addresses=[10, 11])
     master = Master(line.port, Options(address=10)).find()
     with pytest.raises(SettingError, match="address 11 belongs to another device on the line"):
-        master.bus.change_address(master.radar, 11)
+        master.maintenance.change_address(master.radar, 11)
     assert first.address == 10
     master.measure(2)
 
@@ -1021,7 +1024,7 @@ def test_a_refused_address_changes_nothing(connect):
     master, _, simulated = connect()
     simulated.refuse.add(commands.READ_SENSOR + 1)
     with pytest.raises(RefusedError):
-        master.bus.change_address(master.radar, 42)
+        master.maintenance.change_address(master.radar, 42)
     assert (simulated.address, master.radar.address) == (128, 128)
     master.measure(2)
 
@@ -1033,13 +1036,13 @@ def test_without_a_radar_every_action_says_why(start):
     master.lose()
     bus, radar = master.bus, master.radar
     for action in (
-            lambda: bus.write(radar, {"output1.range_max": 1.0}),
-            lambda: bus.execute(radar, commands.READ_RFE_TEMPERATURE),
-            lambda: bus.save(radar, commands.SAVE_ALL_SETTINGS),
-            lambda: bus.stored_values(radar),
-            lambda: bus.restore_factory_settings(radar),
-            lambda: bus.read_raw_signals(radar),
-            lambda: bus.change_address(radar, 42),
+            lambda: bus.maintenance.write(radar, {"output1.range_max": 1.0}),
+            lambda: bus.maintenance.execute(radar, commands.READ_RFE_TEMPERATURE),
+            lambda: bus.maintenance.save(radar, commands.SAVE_ALL_SETTINGS),
+            lambda: bus.maintenance.stored_values(radar),
+            lambda: bus.maintenance.restore_factory_settings(radar),
+            lambda: bus.maintenance.read_raw_signals(radar),
+            lambda: bus.maintenance.change_address(radar, 42),
             lambda: bus.set_enabled(radar, False)):
         with pytest.raises(NoAnswerError, match="128 is not connected: no answer at address"):
             action()

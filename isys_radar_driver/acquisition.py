@@ -1,0 +1,188 @@
+"""Measuring: start and stop, several radars in turn, one measurement after the other."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from driver_common.errors import RefusedError
+from driver_common.settings import Value
+from isys_radar_driver import commands
+from isys_radar_driver.access import Access
+from isys_radar_driver.line import LATENCY
+from isys_radar_driver.radar import Radar
+from isys_radar_driver.targets import Resolution, TargetList, decode_target_list
+
+if TYPE_CHECKING:
+    from isys_radar_driver.session import Listener
+
+REALIGN_PERIOD = 30.0  # s between restarts of a radar that is out of its turn
+
+
+class Acquisition:
+    """The measuring of the radars on a line."""
+
+    def __init__(self, access: Access, radars: Sequence[Radar], wants: Callable[[Radar], bool],
+                 listener: Listener) -> None:
+        """Measure with radars that share a line.
+
+        Args:
+            access: Requests to a radar.
+            radars: All radars on the line.
+            wants: Whether a radar is to measure.
+            listener: Told of every measurement.
+        """
+        self._access = access
+        self._radars = radars
+        self._wants = wants
+        self._listener = listener
+
+    # --- start and stop ---
+
+    def start_or_stop(self, radar: Radar) -> None:
+        """Have a radar measure, or not, as it is wanted; raises DriverError."""
+        if not self._wants(radar):
+            self.stop(radar)
+        elif not radar.measuring:
+            self._start(radar)
+        radar.due = 0.0
+
+    def _start(self, radar: Radar) -> None:
+        """Start; a radar that refuses may measure already (section 3.3.12): it is stopped first."""
+        radar.measuring = None
+        try:
+            self._start_in_turn(radar)
+        except RefusedError:
+            self.stop(radar)
+            self._start_in_turn(radar)
+        radar.measuring = True
+
+    def _start_in_turn(self, radar: Radar) -> None:
+        """Start so that the cycles of the radars on the line end one after the other.
+
+        Each answers at the end of its cycle. Where those come together, a radar's cycle passes
+        while the line waits for another one.
+        """
+        turn = self._turn_of(radar)
+        if turn is not None:
+            time.sleep((turn - time.monotonic()) % radar.cycle_time)
+        self._access.execute(radar, commands.START)
+        radar.forget_lists()
+        radar.cycle_end = radar.aligned = time.monotonic()
+
+    def stop(self, radar: Radar) -> None:
+        """Stop; one of which nobody knows whether it measures may refuse that if it does not."""
+        before, radar.measuring = radar.measuring, None
+        if before is not False:
+            try:
+                self._access.execute(radar, commands.STOP)
+            except RefusedError:  # "not in the right measurement mode" (section 3.3.12)
+                if before:
+                    raise
+            radar.forget_lists()
+        radar.measuring = False
+
+    def write(self, radar: Radar, changes: Mapping[str, Value]) -> dict[str, Value]:
+        """Write settings, stopped where that is needed; see `Device.write`."""
+        with self.stopped_for(radar, changes):
+            return radar.write(self._access.records(radar), changes)
+
+    @contextlib.contextmanager
+    def stopped_for(self, radar: Radar, changes: Iterable[str]) -> Iterator[None]:
+        """Stop the acquisition around changes that need it."""
+        needed = radar.measuring is not False and any(
+            radar.settings[name].needs_stop for name in changes if name in radar.settings)
+        if needed:
+            self.stop(radar)
+        try:
+            yield
+        finally:
+            if needed:
+                with contextlib.suppress(RefusedError):  # it is told again in its next turn
+                    self.start_or_stop(radar)
+
+    # --- measure ---
+
+    def measure(self, radar: Radar) -> None:
+        """Read one target list, and what else was asked for; raises DriverError."""
+        model, options, listener = radar.known_model, radar.options, self._listener
+        resolution = self.resolution(radar)
+        timeout = (max(model.timeout, 1.1 * radar.cycle_time) + LATENCY
+                   + self._access.line.link.seconds(radar.list_size(Resolution.BITS_32)))
+        targets, stamp = self._read_target_list(radar, resolution, timeout)
+        begin = time.monotonic() - (time.time_ns() - stamp) * 1e-9
+        missed = radar.count_list(begin, clipping=targets.clipping, shared=len(self._radars) > 1)
+        listener.on_target_list(radar, targets, stamp)
+        if options.read_range_list and model.supports(commands.READ_RANGE_LIST):
+            range_list, stamp = self._access.timed(radar, commands.READ_RANGE_LIST, timeout)
+            listener.on_range_list(radar, range_list, targets, stamp)
+        if options.read_digital_outputs and model.supports(commands.READ_DIGITAL_OUTPUTS):
+            outputs, stamp = self._access.timed(radar, commands.READ_DIGITAL_OUTPUTS, timeout)
+            listener.on_digital_outputs(radar, outputs, stamp)
+        if missed:
+            self._align(radar)
+
+    def _read_target_list(self, radar: Radar, resolution: Resolution,
+                          timeout: float) -> tuple[TargetList, int]:
+        range_step, output = radar.known_model.range_step_16, radar.options.output
+        parser = self._access.line.parser
+        parser.fixed_targets = radar.fixed_targets if resolution.fixed_length else None
+        try:
+            targets, stamp = self._access.exchange(
+                radar, commands.read_target_list(radar.address, output, resolution),
+                lambda frame: decode_target_list(frame, range_step), timeout, attempts=1)
+        except RefusedError as error:
+            raise RefusedError(
+                f"no target list of output {output} in {resolution.bits} bit, change output or "
+                f"target_list_resolution: {error}") from None
+        radar.fixed_targets = parser.fixed_targets or 0
+        return targets, stamp
+
+    def resolution(self, radar: Radar) -> Resolution:
+        """Return the resolution of the target lists; raises SettingError."""
+        return radar.resolution(self._access.line.link.baud_rate, len(self._radars))
+
+    # --- turns ---
+
+    def _turn_of(self, radar: Radar) -> float | None:
+        """Return when one of its cycles should end; None where there is no radar like it."""
+        other = next((other for other in self._radars if other is not radar and other.sends_lists
+                      and other.cycle_time == radar.cycle_time), None)
+        if other is None:
+            return None
+        places = self._radars.index(radar) - self._radars.index(other)
+        return other.cycle_end + places * self._share_of_cycle(radar)
+
+    def _align(self, radar: Radar) -> None:
+        """Start a radar again that is out of its turn, as the clocks of radars drift apart."""
+        turn, share = self._turn_of(radar), self._share_of_cycle(radar)
+        if (turn is None or time.monotonic() < radar.aligned + REALIGN_PERIOD
+                or self._list_seconds(radar) > share):
+            return
+        if abs(math.remainder(radar.cycle_end - turn, radar.cycle_time)) > share / 4:
+            self.stop(radar)
+            self._start(radar)
+
+    def has_time_for(self, radar: Radar, seconds: float) -> bool:
+        """Whether something else can be done on the line without costing a cycle."""
+        return self._list_seconds(radar) + seconds < self._share_of_cycle(radar)
+
+    def _list_seconds(self, radar: Radar) -> float:
+        """Return how long the longest target list takes on the line."""
+        return self._access.line.link.seconds(radar.list_size(self.resolution(radar)))
+
+    def _share_of_cycle(self, radar: Radar) -> float:
+        """Return how long the line may serve a radar in a cycle, so that each gets its own."""
+        return radar.cycle_time / len(self._radars)
+
+    def least_rate(self, radar: Radar) -> float:
+        """Return the target lists per second which a radar gets whatever the others do.
+
+        In the worst case the cycles end together, and each radar waits for a cycle of every other.
+        """
+        waiting = sum(other.cycle_time for other in self._radars
+                      if other.sends_lists and other is not radar)
+        return 1 / (radar.cycle_time + waiting)
