@@ -9,24 +9,31 @@ from sensor_msgs.msg import Range
 from msg_conversions.header import to_header
 
 NO_ECHO_VALUES = ("inf", "max_range", "nan", "skip")
+TOO_CLOSE_VALUES = ("-inf", "min_range", "skip")
 
 
-def distance_or_no_echo(distance: float, max_range: float, no_echo_value: str) -> float | None:
-    """Return what to publish for a distance where consumers disagree on "nothing seen".
+def published_distance(distance: float, limits: tuple[float, float], no_echo_value: str,
+                       too_close_value: str) -> float | None:
+    """Return what to publish for a distance, where consumers disagree on what lies beyond limits.
 
-    REP-117 wants +inf. The range layer of nav2 clears its map only on `max_range`.
+    REP-117 wants infinities. The range layer of nav2 drops all that is not within the limits: it
+    clears its map only on `max_range`, and marks nothing nearer than `min_range`.
 
     Args:
-        distance: In m; +inf nothing seen.
-        max_range: Largest distance that the sensor measures, in m.
-        no_echo_value: What stands for nothing seen: "inf", "max_range", "nan" or "skip".
+        distance: In m; +inf nothing seen, -inf too close, NaN unknown.
+        limits: Smallest and largest distance that the sensor measures, in m.
+        no_echo_value: What stands for more than the largest: "inf", "max_range", "nan", "skip".
+        too_close_value: What stands for less than the smallest: "-inf", "min_range", "skip".
 
     Returns:
         The distance; None = publish nothing.
     """
-    if distance != math.inf:
-        return distance
-    return {"inf": math.inf, "max_range": max_range, "nan": math.nan, "skip": None}[no_echo_value]
+    smallest, largest = limits
+    if distance > largest:
+        return {"inf": math.inf, "max_range": largest, "nan": math.nan, "skip": None}[no_echo_value]
+    if distance < smallest:
+        return {"-inf": -math.inf, "min_range": smallest, "skip": None}[too_close_value]
+    return distance
 
 
 def to_range(distance: float, limits: tuple[float, float], field_of_view: float, frame_id: str,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass
 from enum import Enum, IntEnum
+from functools import partial
 from typing import Generic, TypeVar
 
 from driver_common.errors import FrameError, SettingError
@@ -65,7 +66,7 @@ class Outcome(Enum):
     ECHO = "echo"
     NO_ECHO = "no echo"
     TOO_CLOSE = "echo in the blind zone"
-    TOO_FAR = "echo beyond 4 m"
+    TOO_FAR = "echo beyond the range"
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,8 @@ class Distance:
     """A measured distance.
 
     Attributes:
-        value: In m; -inf too close, +inf no echo or one from beyond the range.
+        value: In m, within the limits of the profile; -inf too close, +inf no echo or one from
+            beyond the range.
         outcome: Which of them.
     """
 
@@ -84,11 +86,17 @@ class Distance:
 NO_ECHO = Distance(float("inf"), Outcome.NO_ECHO)
 TOO_CLOSE = Distance(float("-inf"), Outcome.TOO_CLOSE)
 TOO_FAR = Distance(float("inf"), Outcome.TOO_FAR)
-_SPECIAL = {0x00: NO_ECHO, 0x01: TOO_CLOSE, 0xFF: TOO_FAR}
+_NO_ECHO_CODE, _TOO_FAR_CODE = 0x00, 0xFF  # 0x01, too close, is below every limit as it is
 
 
-def _distance(data: bytes) -> Distance:
-    return _SPECIAL.get(data[0]) or Distance(round(data[0] * STEP, 3))
+def _distance(limits: tuple[float, float], data: bytes) -> Distance:
+    smallest, largest = limits
+    value = round(data[0] * STEP, 3)
+    if data[0] == _NO_ECHO_CODE:
+        return NO_ECHO
+    if data[0] == _TOO_FAR_CODE or value > largest:
+        return TOO_FAR
+    return TOO_CLOSE if value < smallest else Distance(value)
 
 
 def _celsius(data: bytes) -> int:
@@ -161,8 +169,8 @@ def measure(profile: Profile, cycles: int = 1) -> Command[Distance]:
     """
     if not 1 <= cycles <= MAX_CYCLES:
         raise SettingError(f"cycles = {cycles} is out of range, allowed is 1 … {MAX_CYCLES}")
-    return Command("measure", profile.op_code, _distance, data=0xFF - cycles,
-                   duration=cycles * CYCLE_TIME, section=profile.section)
+    return Command("measure", profile.op_code, partial(_distance, profile.limits),
+                   data=0xFF - cycles, duration=cycles * CYCLE_TIME, section=profile.section)
 
 
 def write_address(address: int) -> Command[int]:

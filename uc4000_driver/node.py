@@ -15,7 +15,12 @@ from sensor_msgs.msg import Range, Temperature
 from driver_common import diagnostics
 from driver_common.device_node import DeviceNode, run
 from driver_common.settings import Option
-from msg_conversions.range import NO_ECHO_VALUES, distance_or_no_echo, to_range
+from msg_conversions.range import (
+    NO_ECHO_VALUES,
+    TOO_CLOSE_VALUES,
+    published_distance,
+    to_range,
+)
 from msg_conversions.temperature import to_temperature
 from uc4000_driver.acquisition import OPERATING_TEMPERATURE, Listener
 from uc4000_driver.commands import MAX_CYCLES, PROFILES, Outcome
@@ -64,7 +69,10 @@ class Uc4000Node(DeviceNode, Listener):
                description="Opening angle of the sound cone; the manual gives no number"),
         Option("no_echo_value", kind=str, choices=_words(*NO_ECHO_VALUES), default="inf",
                live=True, description="What is published where there is no echo, or one from "
-                                      "beyond 4 m; skip = nothing"),
+                                      "beyond the range; skip = nothing"),
+        Option("too_close_value", kind=str, choices=_words(*TOO_CLOSE_VALUES), default="-inf",
+               live=True, description="What is published for an echo from the blind zone; "
+                                      "skip = nothing"),
         Option("time_offset", kind=float, default=0.0, unit="s", live=True,
                description="Added to every stamp; negative where the measurement was earlier"),
         Option("temperature_period", kind=float, default=10.0, minimum=0.0, unit="s", live=True,
@@ -141,8 +149,9 @@ class Uc4000Node(DeviceNode, Listener):
     def on_measurement(self, sensor: Sensor, measurement: Measurement) -> None:
         """Publish the distance."""
         name, limits = sensor.options.name, measurement.profile.limits
-        distance = distance_or_no_echo(measurement.distance.value, limits[1],
-                                       self.option("no_echo_value", name))
+        distance = published_distance(
+            measurement.distance.value, limits, self.option("no_echo_value", name),
+            self.option("too_close_value", name))
         if distance is not None:
             self._publish(sensor, "range", to_range(
                 distance, limits, self.option("field_of_view", name),

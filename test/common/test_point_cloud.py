@@ -1,4 +1,4 @@
-"""Plain values to ROS messages: point clouds, ranges, temperatures, arrays."""
+"""Plain values to ROS messages: point clouds, temperatures, arrays."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ import struct
 import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message, serialize_message
-from sensor_msgs.msg import PointCloud2, PointField, Range
+from sensor_msgs.msg import PointCloud2, PointField
 
 from msg_conversions.header import to_header
 from msg_conversions.multi_array import to_float32_multi_array
 from msg_conversions.point_cloud import to_point_cloud
-from msg_conversions.range import distance_or_no_echo, to_range
 from msg_conversions.temperature import to_temperature
 
 STAMP = 1_700_000_000_123_456_789  # ns
@@ -62,29 +61,6 @@ def test_a_cloud_survives_the_wire():
     again = deserialize_message(serialize_message(cloud), PointCloud2)
     assert again == cloud
     assert isinstance(cloud.data, array.array)
-
-
-def test_a_range():
-    message = to_range(7.5, (0.1, 20.0), 0.2, "mast", STAMP)
-    assert message.range == 7.5
-    assert (message.min_range, message.max_range) == pytest.approx((0.1, 20.0))
-    assert message.field_of_view == pytest.approx(0.2)
-    assert message.radiation_type == Range.ULTRASOUND
-    assert message.header == to_header("mast", STAMP)
-
-
-@pytest.mark.parametrize(("kind", "published"), [
-    ("inf", math.inf), ("max_range", 4.0), ("skip", None)])
-def test_nothing_seen_is_published_as_wanted(kind, published):
-    assert distance_or_no_echo(math.inf, 4.0, kind) == published
-    assert distance_or_no_echo(1.5, 4.0, kind) == 1.5
-    assert distance_or_no_echo(-math.inf, 4.0, kind) == -math.inf
-
-
-def test_nothing_seen_can_be_no_number():
-    distance = distance_or_no_echo(math.inf, 4.0, "nan")
-    assert distance is not None
-    assert math.isnan(distance)
 
 
 def test_a_temperature():

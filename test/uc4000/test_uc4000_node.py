@@ -195,9 +195,24 @@ def test_no_echo_can_be_left_out(simulated, uc4000, heard):
     assert uc4000.set("left.no_echo_value", "inf").successful
 
 
-def test_an_echo_in_the_blind_zone_is_minus_infinity(simulated, heard):
+@pytest.mark.parametrize(("word", "value"), [("min_range", 0.25), ("-inf", -math.inf)])
+def test_an_echo_in_the_blind_zone_is_published_as_wished(simulated, uc4000, heard, word, value):
+    assert uc4000.set("left.too_close_value", word).successful
     simulated["left"].scene = still(0.1)
-    assert heard.next("left/range", unusual).range == -math.inf
+    assert heard.next("left/range", unusual).range == value
+
+
+def test_a_finite_range_lies_within_the_limits(simulated, uc4000, heard):
+    left = simulated["left"]
+    left.limits, left.overreach = (0.03, 4.07), 30.0  # it reports all that it hears
+    assert uc4000.set("left.profile", "a").successful
+    for truth in (0.1, 0.24, 0.256, 3.0, 3.488, 3.504, 3.8, 4.0, 4.06):
+        left.scene = still(truth)
+        message = heard.several("left/range", 3)[-1]  # the first ones may be older
+        expected = truth if 0.25 <= truth <= 3.5 else math.copysign(math.inf, truth - 1.0)
+        assert message.range == pytest.approx(expected, abs=0.008)
+    left.limits, left.overreach = (0.25, 4.0), 0.0
+    assert uc4000.set("left.profile", "b").successful
 
 
 def test_a_refused_measurement_publishes_nothing(simulated, heard, ros):
@@ -353,7 +368,7 @@ def test_diagnostics_of_a_sensor_that_is_well(simulated, ros):
     assert status.values["temperature [°C]"] == "21"
     assert 2.0 < float(status.values["rate [Hz]"]) < 20.0
     for counter in ("measurements", "measurements: echo", "measurements: no echo",
-                    "measurements: echo in the blind zone", "measurements: echo beyond 4 m",
+                    "measurements: echo in the blind zone", "measurements: echo beyond the range",
                     "time-outs", "checksum errors", "refusals", "connections", "stray bytes",
                     "failed measurements of its group"):
         assert int(status.values[counter]) >= 0

@@ -269,14 +269,21 @@ def test_a_request(command: Command[object], address: int, telegram: str) -> Non
 
 
 MEASURE = commands.measure(PROFILES["b"])
+MEASURE_A = commands.measure(PROFILES["a"])
 REPLIES: list[tuple[Command[object], str, object]] = [
     (MEASURE, "23 D1", Distance(0.56)),
     (MEASURE, "10 D1", Distance(0.256)),
     (MEASURE, "FA C6", Distance(4.0)),
-    (MEASURE, "FE D4", Distance(4.064)),
     (MEASURE, "00 C5", Distance(math.inf, Outcome.NO_ECHO)),
     (MEASURE, "01 D4", Distance(-math.inf, Outcome.TOO_CLOSE)),
     (MEASURE, "FF C5", Distance(math.inf, Outcome.TOO_FAR)),
+    (MEASURE, "02 E4", Distance(-math.inf, Outcome.TOO_CLOSE)),  # 0.032 m
+    (MEASURE, "0F C5", Distance(-math.inf, Outcome.TOO_CLOSE)),  # 0.240 m
+    (MEASURE, "FB D7", Distance(math.inf, Outcome.TOO_FAR)),  # 4.016 m
+    (MEASURE, "FE D4", Distance(math.inf, Outcome.TOO_FAR)),
+    (MEASURE_A, "DA E2", Distance(3.488)),
+    (MEASURE_A, "DB F3", Distance(math.inf, Outcome.TOO_FAR)),  # 3.504 m, profile a ends at 3.5 m
+    (MEASURE_A, "F0 C5", Distance(math.inf, Outcome.TOO_FAR)),
     (commands.READ_TEMPERATURE, "15 D2", 21),
     (commands.READ_TEMPERATURE, "E7 F3", -25),
     (commands.READ_TEMPERATURE, "7F ED", 127),

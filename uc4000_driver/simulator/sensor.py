@@ -27,7 +27,7 @@ EVALUATION = 0.005  # s from the end of the last cycle to the reply, at most 10 
 WRITE_TIME = 0.010  # s to store a parameter
 BOOT_TIME = 0.025  # s, section 2.1
 VERSION = b"HW:V0.1 SW:V1.200\0"
-MIN_DISTANCE, MAX_DISTANCE = 0.25, 4.0  # m
+LIMITS = (0.25, 4.0)  # m
 FACTORY_VALUES: dict[str, Value] = {"burst_periods": 32, "gain_db": 72.0, "current_ma": 325,
                                     "temperature_compensation": "on"}
 
@@ -53,6 +53,8 @@ class SimulatedSensor:
         refuse: Error codes with which it refuses, by op-code.
         silent: Whether it does not answer.
         evaluation: Time in s from the last cycle to the reply.
+        limits: Smallest and largest distance in m that it reports as one.
+        overreach: In dB, by which it hears more than its profiles promise.
         hears: Sensors that disturb it while both measure.
         measurements: When its last measurements began and ended, monotonic.
     """
@@ -68,6 +70,8 @@ class SimulatedSensor:
         self.refuse: dict[int, int] = {}
         self.silent = False
         self.evaluation = EVALUATION
+        self.limits = LIMITS
+        self.overreach = 0.0
         self.hears: list[SimulatedSensor] = []
         self.measurements: list[tuple[float, float]] = []
         self._ready = 0.0
@@ -159,13 +163,21 @@ class SimulatedSensor:
         echoes = [distance for distance in found if distance is not None]
         distance = statistics.fmean(echoes) if echoes else None
         if any(other.measurements and other.measurements[-1][1] > now for other in self.hears):
-            distance = MIN_DISTANCE  # the burst of the other one
-        return end + self.evaluation, Reply(bytes((_distance_code(distance),)))
+            distance = self.limits[0]  # the burst of the other one
+        return end + self.evaluation, Reply(bytes((self._distance_code(distance),)))
+
+    def _distance_code(self, distance: float | None) -> int:
+        """Return the data byte of a distance (errata U4)."""
+        if distance is None:
+            return 0x00
+        if distance < self.limits[0]:
+            return 0x01
+        return round(distance / STEP) if distance <= self.limits[1] else 0xFF
 
     def detected(self, op_code: OpCode, now: float) -> float | None:
         """Return the distance in m that a profile finds at a time since the epoch, None = none."""
         distance = self.scene(now)
-        if distance is None or _loss(distance) > self._sensitivity(op_code):
+        if distance is None or _loss(distance) > self._sensitivity(op_code) + self.overreach:
             return None
         if self.value("temperature_compensation") == "off":
             distance *= _speed_of_sound(20.0) / _speed_of_sound(self.temperature)
@@ -198,12 +210,3 @@ def _loss(distance: float) -> float:
 
 def _speed_of_sound(celsius: float) -> float:
     return 331.3 * math.sqrt(1 + celsius / 273.15)
-
-
-def _distance_code(distance: float | None) -> int:
-    """Return the data byte of a distance (errata U4)."""
-    if distance is None:
-        return 0x00
-    if distance < MIN_DISTANCE:
-        return 0x01
-    return round(distance / STEP) if distance <= MAX_DISTANCE else 0xFF
