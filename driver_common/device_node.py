@@ -358,6 +358,10 @@ class DeviceNode(LifecycleNode):
         else:
             self.get_logger().info(f"{device.title}: {text}")
 
+    def on_step(self, pause: float) -> None:
+        """Take note that the bus did a step, and of the time in s until the next one."""
+        self._note_statuses(pause)
+
     def on_bus_state(self, error: DriverError | None) -> None:
         """Take note that the link opened or failed; one line in the log per change."""
         if not self.context.ok():
@@ -501,7 +505,7 @@ class DeviceNode(LifecycleNode):
         self._statuses_due = 0.0
         self._note_statuses(0.0)
         self.thread = DeviceThread(f"{self.get_name()} bus", bus, self.on_bus_state,
-                                   self._note_statuses)
+                                   self.on_step)
         self.thread.start()
         return super().on_configure(state)
 

@@ -100,17 +100,25 @@ class Line:
         return (f"the kernel keeps only {size // 1024} KiB of frames while this host is busy; "
                 f"'sudo sysctl -w net.core.rmem_max={RECEIVE_BUFFER}' allows more")
 
-    def listen(self, duration: float) -> None:
-        """Receive for some s and hand over what arrives; raises LinkError."""
+    def listen(self, duration: float, may_wait: float = 0.0) -> None:
+        """Receive for some s and hand over what arrives; raises LinkError.
+
+        Args:
+            duration: Time in s.
+            may_wait: Time in s for which frames may wait for others: waking up for each of them
+                costs more than to receive it.
+        """
         link, handle = self.link, self.on_stream
         receive, monotonic = link.receive, time.monotonic_ns
         now = monotonic()
         end = now + int(duration * 1e9)
         try:
             while now < end:
-                message = receive((end - now) * 1e-9)
+                message = receive(0.0 if may_wait else (end - now) * 1e-9)
                 if message is None:
-                    return
+                    time.sleep(may_wait)
+                    now = monotonic()
+                    continue
                 now = monotonic()
                 if message.arbitration_id == STREAM_ID and handle and message.is_extended_id:
                     handle(message.data, message.timestamp, now)

@@ -5,23 +5,26 @@ from __future__ import annotations
 import sys
 import time
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from enum import Enum
 from functools import partial
 from typing import Any, NamedTuple
 
+import numpy as np
+import numpy.typing as npt
 from diagnostic_msgs.msg import DiagnosticStatus
-from sensor_msgs.msg import BatteryState, Imu, Temperature
+from sensor_msgs.msg import BatteryState, Imu, PointCloud2, Temperature
 
 from driver_common import diagnostics
 from driver_common.device_node import DeviceNode, run
 from driver_common.settings import Option
 from icotronic_driver.commands import parse_request
 from icotronic_driver.eeprom import PAGE_NAMES, Field, FieldValue
+from icotronic_driver.gathering import Consumer, Conversion, Gatherer, Samples, Stream
 from icotronic_driver.identifier import STH_1, STU_1
 from icotronic_driver.line import Line
 from icotronic_driver.maintenance import STORED
-from icotronic_driver.sensor import Options, Phase, Sensor, UnitIdentity
+from icotronic_driver.sensor import Channel, Options, Phase, Sensor, UnitIdentity
 from icotronic_driver.session import IcotronicBus, Listener
 from icotronic_driver.settings import SETTINGS
 from icotronic_driver.simulator.line import simulated_network
@@ -29,6 +32,7 @@ from icotronic_driver.streaming import AXES
 from icotronic_driver.values import CLOCK, decode_mac, encode_mac
 from msg_conversions.battery import to_battery_state
 from msg_conversions.imu import UNKNOWN_VARIANCE, ImuTemplate
+from msg_conversions.imu_batch import to_imu_batch
 from msg_conversions.temperature import to_temperature
 
 SIMULATED = "sim"
@@ -36,16 +40,17 @@ CHANNELS = {channels: code for code, channels in enumerate(
     ("x", "y", "z", "xy", "xz", "yz", "xyz"))}
 SIGNED_AXES = {sign + axis: code for code, (sign, axis) in enumerate(
     (sign, axis) for sign in ("", "-") for axis in AXES)}
-STREAM_OPTIONS = ("channels", *(f"axis.{axis}" for axis in AXES), "sample_rate",
+STREAM_OPTIONS = ("channels", *(f"axis.{axis}" for axis in AXES), "sample_rate", "batch_period",
                   "calibration_source", "acceleration_range_g", "linear_acceleration_stddev",
                   "time_offset")
 READING_UNITS = {"rssi": " [dBm]", "battery_voltage": " [V]", "temperature": " [°C]"}
 COLLISION = "two channels are mapped to the same axis; correct axis.x, axis.y and axis.z"
 RECEIVERS = {"sth": STH_1, "stu": STU_1}
-CLOCK_WAS_SET = 500_000_000  # ns by which stamps go back only if the host's clock does
 RECENT_TIME = 30.0  # s that count for whether all is well
 LOSS_LIMIT = 0.01  # share of the frames that may be lost without a warning
 QUEUE_DEPTH = 2000  # samples that a publisher keeps for slow subscribers, 0.2 s at the usual rate
+BATCH_DEPTH = 100  # batches, 2 s
+GATHERING_TIME = 0.01  # s for which frames wait for each other where nobody wants each at once
 
 
 class IcotronicNode(DeviceNode, Listener):
@@ -88,6 +93,10 @@ class IcotronicNode(DeviceNode, Listener):
                unit="m/s²", live=True,
                description="Standard deviation of the acceleration, for the covariance; 0 = "
                            "unknown"),
+        Option("publish_samples", kind=bool, default=True,
+               description="Publish each sample as a message of its own, on imu/data_raw"),
+        Option("batch_period", kind=float, default=0.02, minimum=0.0, maximum=1.0, unit="s",
+               live=True, description="Time whose samples are one message on imu/batch; 0 = off"),
         Option("status_period", kind=float, default=8.0, minimum=0.5, maximum=3600.0, unit="s",
                live=True, description="Time in which battery, temperature, RSSI, states and "
                                       "counters are read once"),
@@ -106,6 +115,7 @@ class IcotronicNode(DeviceNode, Listener):
         """Declare the parameters; raises SettingError."""
         self._stream_options: list[Any] = []
         self._topics: dict[str, Any] = {}
+        self._stream = Stream((), 1, 0)
         self._history: deque[_Counts] = deque()
         super().__init__("icotronic")
 
@@ -126,6 +136,7 @@ class IcotronicNode(DeviceNode, Listener):
             wanted=self.wanted_settings(""), config_mode=self.option("config_mode"))
         self._set_live(sensor)
         self._stream_options = self._read_stream_options()
+        self._stream = Stream((), 1, 0)
         return IcotronicBus(Line(interface, channel, self.option("can_bitrate"), options),
                             sensor, self)
 
@@ -154,9 +165,11 @@ class IcotronicNode(DeviceNode, Listener):
     def make_interfaces(self, sensor: str) -> None:
         """Create topics and services."""
         self._topics = {
-            "imu": self.add_publisher(Imu, sensor, "imu/data_raw", depth=QUEUE_DEPTH),
+            "batch": self.add_publisher(PointCloud2, sensor, "imu/batch", depth=BATCH_DEPTH),
             "battery_voltage": self.add_publisher(BatteryState, sensor, "battery"),
             "temperature": self.add_publisher(Temperature, sensor, "temperature")}
+        if self.option("publish_samples"):
+            self._topics["imu"] = self.add_publisher(Imu, sensor, "imu/data_raw", QUEUE_DEPTH)
         super().make_interfaces(sensor)
         for name, action in (
                 ("scan", self._scan),
@@ -194,19 +207,44 @@ class IcotronicNode(DeviceNode, Listener):
         axes = self._axes(sensor)
         if _collide(axes):
             self.on_note(sensor, COLLISION, warning=True)
-        variances = [UNKNOWN_VARIANCE] * 3
-        for axis in axes:
-            variances[axis % 3] = self.option("linear_acceleration_stddev") ** 2
-        template = ImuTemplate(variances, self.option("frame_id"))
-        offset = round(self.option("time_offset") * 1e9)
-        places = [_Place(0, 0.0, 0.0)] * 3
-        for number, (channel, axis) in enumerate(zip(sensor.channels, axes, strict=True)):
-            sign = -1.0 if axis >= 3 else 1.0
-            places[axis % 3] = _Place(number, sign * channel.slope, sign * channel.offset)
-        # publish() itself costs twice as much, because it looks at what it was given.
-        publish = self._topics["imu"].handle.publish_raw
-        return self.while_running(_publisher(
-            template.serialised, publish, places, len(sensor.channels), offset))
+        conversion = Conversion([partial(_linear, channel) for channel in sensor.channels], axes)
+        self._stream.finish()
+        self._stream = Stream(self._consumers(axes, conversion), len(axes),
+                              round(self.option("time_offset") * 1e9))
+        return self.while_running(self._stream.take)
+
+    def _consumers(self, axes: Sequence[int], conversion: Conversion) -> Iterator[Consumer]:
+        """Yield those who take the samples of a stream."""
+        frame_id, batch_period = self.option("frame_id"), self.option("batch_period")
+        if "imu" in self._topics:
+            variances = [UNKNOWN_VARIANCE] * 3
+            for axis in axes:
+                variances[axis % 3] = self.option("linear_acceleration_stddev") ** 2
+            template = ImuTemplate(variances, frame_id)
+            topic = self._topics["imu"]
+            # publish() itself costs twice as much, because it looks at what it was given.
+            yield Consumer(topic.get_subscription_count, _publisher(
+                template.serialised, topic.handle.publish_raw, conversion))
+        if batch_period:
+            topic = self._topics["batch"]
+
+            def publish(samples: Samples) -> None:
+                topic.publish(to_imu_batch(samples.stamps, samples.accelerations, frame_id))
+
+            gatherer = Gatherer(batch_period, conversion, publish)
+            yield Consumer(topic.get_subscription_count, gatherer.take, gatherer)
+
+    def on_step(self, pause: float) -> None:
+        """Look who listens to the stream, and hand over what waits for too long."""
+        super().on_step(pause)
+        self.while_running(self._look_who_listens)()
+
+    def _look_who_listens(self) -> None:
+        sensor: Sensor = self.bus.sensor
+        if sensor.decoder is None:
+            self._stream.finish()
+        at_once = self._stream.look(time.time_ns())
+        sensor.options.may_wait = 0.0 if at_once else GATHERING_TIME
 
     def _axes(self, sensor: Sensor) -> list[int]:
         """Return the signed axis of each channel."""
@@ -354,36 +392,22 @@ class _Counts(NamedTuple):
     errors: int
 
 
-class _Place(NamedTuple):
-    """Which value of a sample belongs to an axis, and what makes it m/s².
-
-    With slope and offset 0 it is an axis that is not measured.
-    """
-
-    number: int
-    slope: float
-    offset: float
+def _linear(channel: Channel, raw: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Return m/s² of raw values of a channel."""
+    return channel.slope * raw + channel.offset
 
 
 def _publisher(serialise: Callable[[int, float, float, float], bytes],
-               publish: Callable[[bytes], None], places: Sequence[_Place], channels: int,
-               stamp_offset: int) -> Callable[[int, float, tuple[int, ...]], None]:
-    """Return what publishes the samples of data frames: the hot path."""
-    (x, x_slope, x_offset), (y, y_slope, y_offset), (z, z_slope, z_offset) = places
-    last = 0
+               publish: Callable[[bytes], None],
+               conversion: Conversion) -> Callable[[int, int, tuple[int, ...]], None]:
+    """Return what publishes the samples of a frame one by one: the hot path."""
+    (x, x_table), (y, y_table), (z, z_table) = conversion.columns()
+    channels = conversion.channels
 
-    def publish_samples(stamp: int, period: float, values: tuple[int, ...]) -> None:
-        nonlocal last
-        stamp += stamp_offset
-        if stamp < last - CLOCK_WAS_SET:
-            last = stamp - 1
-        step = int(period)
+    def publish_samples(stamp: int, step: int, values: tuple[int, ...]) -> None:
         for first in range(0, len(values), channels):
-            # A better estimate of the sensor's clock may lie before what was published.
-            last = stamp if stamp > last else last + 1
-            publish(serialise(last, x_slope * values[first + x] + x_offset,
-                              y_slope * values[first + y] + y_offset,
-                              z_slope * values[first + z] + z_offset))
+            publish(serialise(stamp, x_table[values[first + x]], y_table[values[first + y]],
+                              z_table[values[first + z]]))
             stamp += step
 
     return publish_samples

@@ -64,6 +64,7 @@ class Options(DeviceOptions):
         calibration_source: "device", "range", or "auto" = device where that is plausible.
         acceleration_range: The sensor measures ± this many g, for the calibration by range.
         status_period: Time in s in which battery, temperature, RSSI and counters are read once.
+        may_wait: Time in s for which frames may wait for each other; nobody wants each at once.
     """
 
     sensor_name: str = ""
@@ -74,6 +75,7 @@ class Options(DeviceOptions):
     calibration_source: str = "auto"
     acceleration_range: float = 100.0
     status_period: float = 8.0
+    may_wait: float = 0.0
 
 
 @dataclass(frozen=True)

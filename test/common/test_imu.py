@@ -1,13 +1,17 @@
 """Accelerations as messages: the object, and the bytes that are patched."""
 
 import math
+import struct
 
+import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message, serialize_message
-from sensor_msgs.msg import Imu
+from sensor_msgs.msg import Imu, PointCloud2, PointField
 
 from msg_conversions.battery import to_battery_state
 from msg_conversions.imu import ImuTemplate, to_imu
+from msg_conversions.imu_batch import from_imu_batch, to_imu_batch
+from msg_conversions.point_cloud import to_point_cloud
 
 VARIANCES = (0.25, 1e6, 1e6)
 STAMP = 1_800_000_000_123_456_789
@@ -31,6 +35,29 @@ def test_an_imu_tells_what_it_does_not_measure():
     assert imu.orientation_covariance[0] == imu.angular_velocity_covariance[0] == -1.0
     assert list(imu.linear_acceleration_covariance) == [0.25, 0, 0, 0, 1e6, 0, 0, 0, 1e6]
     assert imu.orientation.w == 1.0
+
+
+def test_a_batch_is_a_cloud_with_a_point_per_sample():
+    stamps = np.array([STAMP, STAMP + 105_000, STAMP + 7_000_000_001])
+    accelerations = np.array([[1.5, 0, -2], [0.1, 0, 3], [4, 0, 5]], np.float32)
+    cloud = deserialize_message(
+        serialize_message(to_imu_batch(stamps, accelerations, "imu_link")), PointCloud2)
+    assert (cloud.header.stamp.sec, cloud.header.stamp.nanosec) == (1_800_000_000, 123_456_789)
+    assert (cloud.header.frame_id, cloud.height, cloud.width) == ("imu_link", 1, 3)
+    assert (cloud.point_step, cloud.row_step, cloud.is_dense) == (20, 60, True)
+    assert [(field.name, field.offset, field.datatype, field.count) for field in cloud.fields] == [
+        ("t", 0, PointField.FLOAT64, 1), ("x", 8, PointField.FLOAT32, 1),
+        ("y", 12, PointField.FLOAT32, 1), ("z", 16, PointField.FLOAT32, 1)]
+    assert struct.unpack_from("<dfff", bytes(cloud.data), 20) == (
+        0.000105, pytest.approx(0.1), 0.0, 3.0)
+    read = from_imu_batch(cloud)
+    assert read[0].tolist() == stamps.tolist()
+    np.testing.assert_array_equal(read[1], accelerations)
+
+
+def test_another_cloud_is_no_batch():
+    with pytest.raises(ValueError, match=r"fields \['x', 'y', 'z', .* is no batch"):
+        from_imu_batch(to_point_cloud([], "radar_link", STAMP))
 
 
 def test_a_battery_tells_its_voltage_and_nothing_else():

@@ -18,17 +18,18 @@ import rclpy
 from nodes import NodeProcess, Ros
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
-from sensor_msgs.msg import BatteryState, Imu, Temperature
+from sensor_msgs.msg import BatteryState, Imu, PointCloud2, Temperature
 
 from driver_common.simulator.bus import CanFrame
 from icotronic_driver import commands
 from icotronic_driver.identifier import STU_1
 from icotronic_driver.line import STREAM_ID
-from icotronic_driver.node import IcotronicNode, _Place, _publisher
+from icotronic_driver.node import IcotronicNode
 from icotronic_driver.settings import SETTINGS
 from icotronic_driver.simulator.line import SimulatedIcotronic, simulated_network
 from icotronic_driver.streaming import STANDARD_GRAVITY
 from icotronic_driver.values import AdcConfiguration
+from msg_conversions.imu_batch import from_imu_batch
 
 DEADLINE = 15.0  # s; far more than anything takes, also on a busy machine
 MODULE, NAME, STATUS = "icotronic_driver.node", "/icotronic", "icotronic: sensor"
@@ -62,22 +63,24 @@ def close_to(*accelerations):
 class Samples:
     """A subscriber that keeps up with every rate: it takes bytes, without an executor."""
 
-    def __init__(self, ros, depth=50_000):
+    def __init__(self, ros, kind=Imu, topic=f"{NAME}/imu/data_raw"):
         self._node = rclpy.create_node("recorder", context=ros.node.context)
+        self._kind, self._topic = kind, topic
         self._subscription = self._node.create_subscription(
-            Imu, f"{NAME}/imu/data_raw", lambda message: None, QoSProfile(depth=depth), raw=True)
+            kind, topic, lambda message: None, QoSProfile(depth=50_000), raw=True)
         self.messages = []
 
     def close(self):
         self._node.destroy_node()
 
     def is_matched(self):
-        return self._node.count_publishers(f"{NAME}/imu/data_raw") > 0
+        return self._node.count_publishers(self._topic) > 0
 
     def take(self):
         """Take all that has come."""
         with self._subscription.handle:
-            while (taken := self._subscription.handle.take_message(Imu, True)) is not None:
+            while (taken := self._subscription.handle.take_message(
+                    self._kind, True)) is not None:
                 self.messages.append(taken[0])
 
     def until(self, count):
@@ -115,20 +118,6 @@ def start():
     yield start_one
     for server in servers:
         server.close()
-
-
-# --- stamps ------------------------------------------------------------------------------------
-
-@pytest.mark.parametrize(("second", "published"), [
-    (3_100, [3_100, 3_200]), (2_050, [2_101, 2_150]), (1_500, [2_101, 2_102]),
-    (-10**9, [-10**9, -10**9 + 100])])
-def test_stamps_go_back_only_if_the_clock_was_set(second, published):
-    stamps = []
-    publish = _publisher(lambda stamp, x, y, z: stamp, stamps.append,
-                         [_Place(0, 1.0, 0.0)] * 3, 1, 0)
-    publish(2_000, 100.0, (1, 2))
-    publish(second, 100.0, (3, 4))
-    assert stamps == [2_000, 2_100, *published]
 
 
 # --- a node that runs through many tests -------------------------------------------------------
@@ -545,6 +534,72 @@ def test_every_sample_arrives_with_its_value_and_its_time(ros, start, launch, sa
     steps = np.diff(stamps[settled]) * 1e-9 * RATE
     assert np.median(steps) == pytest.approx(1.0, rel=1e-3)
     assert np.quantile(np.abs(steps - 1.0), 0.99) < 0.05
+
+
+@pytest.fixture
+def batches(ros):
+    recorder = Samples(ros, PointCloud2, f"{NAME}/imu/batch")
+    yield recorder
+    recorder.close()
+
+
+def test_a_batch_holds_exactly_the_samples_that_are_published_one_by_one(
+        ros, start, launch, samples, batches):
+    server = start()
+    process = launch(at(server, autostart=False, channels="xz", **{"axis.z": "-y"}))
+    node = ros.remote(NAME)
+    assert node.change_state("configure")
+    process.wait_for_line("connected to")
+    ros.wait_until(lambda: samples.is_matched() and batches.is_matched())
+    server.network.faults.loss = 0.01
+    assert node.change_state("activate")
+    samples.until(10_000)
+    assert node.change_state("deactivate")
+    status = ros.wait_for_status(
+        STATUS, lambda status: int(status.values["frames"]) == server.network.streamed)
+    assert int(status.values["lost frames"]) > 0
+    samples.until(int(status.values["frames"]))
+    stamps, accelerations = samples.table()
+
+    def in_batches():
+        batches.take()
+        clouds = [deserialize_message(message, PointCloud2) for message in batches.messages]
+        return clouds if sum(cloud.width for cloud in clouds) == len(stamps) else None
+
+    clouds = ros.wait_until(in_batches)
+    parts = [from_imu_batch(cloud) for cloud in clouds]
+    assert np.concatenate([part for part, _ in parts]).tolist() == stamps.tolist()
+    np.testing.assert_array_equal(np.concatenate([part for _, part in parts]), accelerations)
+    assert {cloud.header.frame_id for cloud in clouds} == {"imu_link"}
+    periods = [part // 20_000_000 for part, _ in parts]
+    assert all(len(set(period)) == 1 for period in periods)
+    assert len({period[0] for period in periods}) == len(periods)
+    process.stop()
+
+
+def test_with_batches_alone_no_sample_gets_lost(ros, start, launch, batches):
+    server = start()
+    process = launch(at(server, autostart=False, publish_samples=False, batch_period=0.1))
+    node = ros.remote(NAME)
+    assert node.change_state("configure")
+    process.wait_for_line("connected to")
+    ros.wait_until(batches.is_matched)
+    assert f"{NAME}/imu/data_raw" not in dict(ros.node.get_topic_names_and_types())
+    assert node.change_state("activate")
+    batches.until(10)
+    assert node.change_state("deactivate")
+    status = ros.wait_for_status(
+        STATUS, lambda status: int(status.values["frames"]) == server.network.streamed)
+
+    def stamps():
+        batches.take()
+        return np.concatenate([from_imu_batch(deserialize_message(message, PointCloud2))[0]
+                               for message in batches.messages])
+
+    ros.wait_until(lambda: len(stamps()) == 3 * int(status.values["frames"]))
+    assert np.diff(stamps()).min() > 0
+    assert status.values["lost frames"] == "0"
+    process.stop()
 
 
 def test_stamps_increase_and_no_sample_is_invented_on_a_bad_radio(ros, start, launch, samples):
