@@ -151,7 +151,7 @@ class Device:
         """Return the wanted values, as the device can hold them, that it does not have yet."""
         wanted = {}
         for name, value in self.options.wanted.items():
-            if name in self.settings and value != self.values[name]:
+            if name in self.settings and not self.settings[name].is_same(value, self.values[name]):
                 try:
                     checked = self.settings[name].check(value)
                 except SettingError as error:

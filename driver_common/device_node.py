@@ -30,8 +30,15 @@ SENSOR_NAME = re.compile("[a-z][a-z0-9_]*")
 CONFIG_MODES = {"push": 0, "check": 1, "leave": 2}
 
 SENSORS = Option(
-    "sensors", kind=list, default=[],
-    description="Names of the sensors on the bus; empty = a single one without a name")
+    "sensors", kind=list, default=[], read_only=True,
+    description="Names of the sensors on the bus, given at the start; empty = a single one "
+                "without a name")
+FRAME_ID = Option(
+    "frame_id", kind=str, default="{sensor}_link", pattern=r"[^/\s]\S*", live=True,
+    description="Frame of the measurements, a name without spaces and without a slash in front")
+TIME_OFFSET = Option(
+    "time_offset", kind=float, default=0.0, minimum=-10.0, maximum=10.0, unit="s", live=True,
+    description="Added to every stamp; negative where the measurement was earlier")
 COMMON_OPTIONS = (
     Option("autostart", kind=bool, default=True,
            description="Configure and activate without being asked"),
@@ -126,6 +133,9 @@ class DeviceNode(LifecycleNode):
             for option in self.SENSOR_OPTIONS:
                 self._declare_option(self.prefix(sensor), option)
         self._warn_of_unknown_overrides()
+        if self.get_parameter("use_sim_time").value:
+            self.get_logger().warning("use_sim_time has no effect: stamps are this host's time of "
+                                      "the measurement")
 
     @classmethod
     def bus_options(cls) -> list[Option]:
@@ -219,7 +229,9 @@ class DeviceNode(LifecycleNode):
         own = [parameter for parameter in parameter_list
                if parameter.name in self.store.rows or not self.has_parameter(parameter.name)]
         if not own:
-            return super().set_parameters_atomically(parameter_list)
+            return super().set_parameters_atomically([
+                parameter for parameter in parameter_list
+                if not self.store.is_so_already(parameter)])
         try:
             if len(own) < len(parameter_list):
                 raise SettingError("set the parameters of ROS, such as use_sim_time, separately")
@@ -600,4 +612,5 @@ def run(make_node: Callable[[], DeviceNode], args: Sequence[str] | None = None) 
 
 
 _ArgumentErrors = (RuntimeError, ValueError, rclpy.exceptions.InvalidParameterException,
+                   rclpy.exceptions.InvalidParameterTypeException,
                    rclpy.exceptions.InvalidParameterValueException)

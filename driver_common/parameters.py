@@ -83,8 +83,11 @@ class ParameterStore:
                 self.store({name: value})
                 return
             self.undeclare([name])
-        self._node.declare_parameter(name, value, to_descriptor(row, value), ignore_override=True)
+        # By type first: rclpy takes an empty list for one of bytes.
+        self._node.declare_parameter(name, _TYPES[row.kind], to_descriptor(row, value),
+                                     ignore_override=True)
         self.rows[name] = row
+        self.store({name: value})
 
     def undeclare(self, names: Iterable[str]) -> None:
         """Take parameters away."""
@@ -109,7 +112,10 @@ class ParameterStore:
         return result
 
     def check(self, parameters: Iterable[RosParameter]) -> dict[str, Value]:
-        """Return the values that a set would give.
+        """Return the values that a set would give, without those that change nothing.
+
+        So what was read from a node can be given back to it as a whole, with all that can be read
+        only and all that the device did not tell.
 
         Raises:
             SettingError: A name is not known, or a value is not acceptable.
@@ -121,10 +127,21 @@ class ParameterStore:
             if row is None:
                 raise SettingError(f"{name} is not a parameter of this node"
                                    f"{suggestion(name, self.rows)}")
-            if row.read_only:
-                raise SettingError(f"{name} can be read only")
-            values[name] = row.check(parameter.value)
+            present = self._node.get_parameter(name).value
+            try:
+                if row.read_only:
+                    raise SettingError(f"{name} can be read only")
+                values[name] = row.check(parameter.value)
+            except SettingError:
+                if not row.is_same(parameter.value, present):
+                    raise
         return values
+
+    def is_so_already(self, parameter: RosParameter) -> bool:
+        """Whether a parameter of ROS that can be read only has this value."""
+        name = parameter.name
+        return bool(self._node.describe_parameter(name).read_only
+                    and self._node.get_parameter(name).value == parameter.value)
 
     def unknown_overrides(self, prefix: str, known: Iterable[str], owner: str) -> list[str]:
         """Return a line for each override that begins with `prefix` and is not in `known`."""

@@ -12,6 +12,7 @@ import contextlib
 import difflib
 import ipaddress
 import math
+import re
 import struct
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
@@ -24,6 +25,7 @@ Value: TypeAlias = bool | int | float | str | list[str]
 Raw: TypeAlias = int | float | bytes
 
 UNKNOWN = -1  # raw value that a device cannot tell; value of a code that is not in a table
+_YAML_WORDS = {True: ("on", "y"), False: ("off", "n")}  # which YAML 1.1 reads as true and false
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,7 @@ class Parameter:
         minimum: Smallest allowed value, or None.
         maximum: Largest allowed value, or None.
         choices: Allowed words, each with its code on the wire; None for free values.
+        pattern: What a free text must match, as a regular expression; "" for any text.
         read_only: Whether the value can be read only.
         description: One line for people.
     """
@@ -48,6 +51,7 @@ class Parameter:
     minimum: float | None = None
     maximum: float | None = None
     choices: Mapping[str, int] | None = None
+    pattern: str = ""
     read_only: bool = False
     description: str = ""
 
@@ -66,11 +70,8 @@ class Parameter:
             value = float(value)
         if self.kind is int and isinstance(value, float) and value.is_integer():
             value = int(value)
-        if self.choices is not None and _as_word(value) in self.choices:
-            value = _as_word(value)
-        if isinstance(value, bool) and self.choices is not None:
-            word = "on" if value else "off"  # which YAML reads as true and false
-            value = word if word in self.choices else value
+        if self.kind is str:
+            value = self._as_text(value)
         if self.kind is list and isinstance(value, Sequence) and not isinstance(value, str):
             if all(isinstance(item, str) for item in value):
                 return list(value)
@@ -81,10 +82,26 @@ class Parameter:
             close = suggestion(str(value), self.choices)
             raise SettingError(f"{self.name} must be one of {', '.join(self.choices)}, "
                                f"not {value!r}{close}")
+        if isinstance(value, str) and self.pattern and not re.fullmatch(self.pattern, value):
+            raise SettingError(f"{self.name} cannot be {value!r}: {self.description}")
         if isinstance(value, (int, float)) and not isinstance(value, bool):
             self._check_limits(value)
         assert isinstance(value, (bool, int, float, str))
         return value
+
+    def _as_text(self, value: object) -> object:
+        """Return the text that YAML took for another type: on, y, 16, inf, a name of digits."""
+        if isinstance(value, bool):
+            return next((word for word in _YAML_WORDS[value] if word in (self.choices or ())),
+                        value)
+        if isinstance(value, (int, float)) and (self.choices is None or str(value) in self.choices):
+            return str(value)
+        return value
+
+    def is_same(self, value: object, other: object) -> bool:
+        """Whether two values say the same, also that the device did not tell it."""
+        both_nan = str(value) == str(other) == "nan"  # a text where ros2 param load gave it
+        return value == other or both_nan
 
     def _check_limits(self, value: float) -> None:
         minimum, maximum = self.limits
@@ -285,13 +302,6 @@ class Setting(Parameter):
         if self.kind is float:
             return round(raw * self.factor + self.offset, 9)
         return self.kind(raw * self.factor + self.offset)  # type: ignore[no-any-return]
-
-
-def _as_word(value: object) -> str:
-    """Return the word that YAML took for another type: on, off, 16, inf, nan."""
-    if isinstance(value, bool):
-        return "on" if value else "off"
-    return str(value)
 
 
 def _shortest_float32(value: float) -> float:

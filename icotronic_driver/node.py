@@ -6,6 +6,7 @@ import sys
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from enum import Enum
 from functools import partial
 from typing import Any, NamedTuple
@@ -16,7 +17,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from sensor_msgs.msg import BatteryState, Imu, PointCloud2, Temperature
 
 from driver_common import diagnostics
-from driver_common.device_node import DeviceNode, run
+from driver_common.device_node import FRAME_ID, TIME_OFFSET, DeviceNode, run
 from driver_common.settings import Option
 from icotronic_driver.commands import parse_request
 from icotronic_driver.eeprom import PAGE_NAMES, Field, FieldValue
@@ -73,7 +74,7 @@ class IcotronicNode(DeviceNode, Listener):
                description="The sensor with this MAC address, such as 08:6B:D7:01:DE:81"),
         Option("sensor_number", kind=int, default=-1, minimum=-1, maximum=254,
                description="The sensor with this number at the stationary unit; -1 = any"),
-        Option("frame_id", kind=str, default="imu_link", description="Frame of the measurements"),
+        replace(FRAME_ID, default="imu_link", live=False),
         Option("channels", kind=str, choices=CHANNELS, default="x", live=True,
                description="Which channels are streamed; they share the rate of the ADC"),
         *(Option(f"axis.{axis}", kind=str, choices=SIGNED_AXES, default=axis, live=True,
@@ -105,9 +106,7 @@ class IcotronicNode(DeviceNode, Listener):
                            "its arguments, such as write_state 2"),
         Option("command_receiver", kind=str, choices=RECEIVERS, default="sth", live=True,
                description="Who is asked: the sensor (sth) or the stationary unit (stu)"),
-        Option("time_offset", kind=float, default=0.0, minimum=-10.0, maximum=10.0, unit="s",
-               live=True,
-               description="Added to every stamp; negative where the measurement was earlier"),
+        TIME_OFFSET,
     )
     ALL_SETTINGS = SETTINGS
 

@@ -13,7 +13,7 @@ from sensor_msgs.msg import PointCloud2, Range, Temperature
 from std_msgs.msg import Float32MultiArray
 
 from driver_common import diagnostics
-from driver_common.device_node import DeviceNode, run
+from driver_common.device_node import FRAME_ID, TIME_OFFSET, DeviceNode, run
 from driver_common.settings import Option, Value
 from isys_radar_driver import commands
 from isys_radar_driver.commands import Command, RangeList
@@ -65,15 +65,13 @@ class IsysRadarNode(DeviceNode, Listener):
                description="Address on the line; 0 = ask (only one sensor may be connected)"),
         ModelOption("model", kind=str, default="",
                description="The only model that is accepted, such as iSYS-4001; empty = any"),
-        Option("frame_id", kind=str, default="{sensor}_link", live=True,
-               description="Frame of the measurements"),
+        FRAME_ID,
         Option("output", kind=int, default=1, minimum=1, maximum=3, live=True,
                description="Output whose filter the target lists have passed"),
         Option("target_list_resolution", kind=str, choices=RESOLUTIONS, default="auto", live=True,
                description="Bits per value of the target lists; auto = the finest that fits the "
                            "cycle at this baud rate, with all radars of the line"),
-        Option("time_offset", kind=float, default=0.0, unit="s", live=True,
-               description="Added to every stamp; negative where the measurement was earlier"),
+        TIME_OFFSET,
         Option("positive_velocity", kind=str, default="approaching", live=True,
                choices=POSITIVE_VELOCITY,
                description="What the device means by a positive velocity"),

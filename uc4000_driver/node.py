@@ -13,7 +13,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from sensor_msgs.msg import Range, Temperature
 
 from driver_common import diagnostics
-from driver_common.device_node import DeviceNode, run
+from driver_common.device_node import FRAME_ID, TIME_OFFSET, DeviceNode, run
 from driver_common.settings import Option
 from msg_conversions.range import (
     NO_ECHO_VALUES,
@@ -55,8 +55,7 @@ class Uc4000Node(DeviceNode, Listener):
     SENSOR_OPTIONS = (
         Option("address", kind=int, default=0, minimum=0, maximum=LAST_ADDRESS,
                description="Address on the wire; 0 = ask (only one sensor may be connected)"),
-        Option("frame_id", kind=str, default="{sensor}_link", live=True,
-               description="Frame of the measurements, x along the sound"),
+        FRAME_ID,
         Option("profile", kind=str, choices=_words(*PROFILES), default="b", live=True,
                description="Measurement profile: a = short range up to 3.5 m, b = middle, c = far, "
                            "user = by burst_periods, gain_db and current_ma"),
@@ -73,8 +72,7 @@ class Uc4000Node(DeviceNode, Listener):
         Option("too_close_value", kind=str, choices=_words(*TOO_CLOSE_VALUES), default="-inf",
                live=True, description="What is published for an echo from the blind zone; "
                                       "skip = nothing"),
-        Option("time_offset", kind=float, default=0.0, unit="s", live=True,
-               description="Added to every stamp; negative where the measurement was earlier"),
+        TIME_OFFSET,
         Option("temperature_period", kind=float, default=10.0, minimum=0.0, unit="s", live=True,
                description="Time between two readings of the temperature; 0 = none"),
         Option("new_address", kind=int, default=0, minimum=0, maximum=LAST_ADDRESS, live=True,

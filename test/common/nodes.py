@@ -241,8 +241,11 @@ class RemoteNode:
 
     def set(self, name, value):
         """Set a parameter and return the result."""
-        return self._call(SetParameters, "set_parameters", parameters=[
-            Parameter(name, value=value).to_parameter_msg()]).results[0]
+        return self.set_raw(Parameter(name, value=value).to_parameter_msg())
+
+    def set_raw(self, parameter):
+        """Set a parameter, given as a message, and return the result."""
+        return self._call(SetParameters, "set_parameters", parameters=[parameter]).results[0]
 
     def set_atomically(self, values):
         """Set all parameters or none, and return the result."""

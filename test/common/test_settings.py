@@ -75,7 +75,7 @@ def test_a_good_value_comes_back_in_the_parameters_type(
     (MODE, "x", "mode must be one of fast, slow, not 'x'"),
     (MODE, 1, "mode must be one of fast, slow, not 1"),
     (FLAG, 1, "flag must be true or false, not 1"),
-    (NAME, 1, "name must be a text, not 1"),
+    (NAME, True, "name must be a text, not True"),
     (NAMES, "front", "names must be a list of words, not 'front'"),
     (NAMES, ["front", 1], "names must be a list of words, not ['front', 1]"),
     (NAMES, 5, "names must be a list of words, not 5"),
@@ -402,3 +402,22 @@ def test_a_bad_name_or_value_sends_nothing(changes: dict[str, Any], text: str) -
         write_settings(device, SETTINGS, changes)
     assert str(caught.value) == text
     assert device.log == []
+
+
+# --- parameter files -----------------------------------------------------------------------------
+
+@pytest.mark.parametrize(("parameter", "given", "value"), [
+    (NAME, 1234, "1234"), (NAME, 12.5, "12.5"),
+    (Parameter("axis", kind=str, choices={"x": 0, "y": 1}), True, "y"),
+    (Parameter("axis", kind=str, choices={"x": 0, "n": 1}), False, "n"),
+    (Parameter("echo", kind=str, choices={"off": 0, "on": 1}), True, "on"),
+    (Parameter("size", kind=str, choices={"16": 0, "32": 1}), 16, "16")])
+def test_a_text_that_yaml_takes_for_another_type(parameter, given, value):
+    assert parameter.check(given) == value
+
+
+def test_a_text_that_does_not_match_is_refused_with_what_is_allowed():
+    frame = Parameter("frame_id", kind=str, pattern=r"[^/]+", description="a name without slashes")
+    assert frame.check("link") == "link"
+    with pytest.raises(SettingError, match="frame_id cannot be '/link': a name without slashes"):
+        frame.check("/link")

@@ -510,14 +510,13 @@ def test_every_cycle_is_published_or_counted_as_lost(shared):
 
 def test_options_that_may_change_at_run_time_work_at_once(shared):
     scene, shared.radar.scene = shared.radar.scene, lambda now: [TARGET]
-    start = time.time()
     assert shared.remote.set_atomically({
-        "frame_id": "bumper", "time_offset": -1000.0, "target_list_resolution": "16",
+        "frame_id": "bumper", "time_offset": -10.0, "target_list_resolution": "16",
         "output": 2}).successful
     shared.remote.set("output2.range_max", 9.0)
     cloud = wait_for_points(shared.remote, lambda cloud: cloud.width == 0)
     assert cloud.header.frame_id == "bumper"
-    assert stamp_of(cloud) < start - 900.0
+    assert time.time() - stamp_of(cloud) > 9.0
     shared.remote.set("output2.range_max", 11.0)
     cloud = wait_for_points(shared.remote)
     assert points_of(cloud)[0]["intensity"] == 42.0  # 16-bit lists have whole dB
