@@ -13,6 +13,7 @@ from pathlib import Path
 
 from bench import decode, imu
 from bench.measure import Failure, Row, divide_cores
+from sensor_tools.ros_domain import claim_domain
 
 MULTIPLES = (2, 4, 6, 8, 10, 12, 14, 16)
 
@@ -30,6 +31,7 @@ def main(args: Sequence[str] | None = None) -> int:
         except OSError as error:
             parser.error(f"cannot write {options.json}: {error.strerror}")
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    os.environ.setdefault("ROS_DOMAIN_ID", str(claim_domain()))
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that no process is left behind
     failures: list[Failure] = []
     try:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from driver_common.errors import DriverError
+from sensor_tools.ros_domain import claim_domain
 
 if TYPE_CHECKING:
     from sensor_tools.demo.comparison import Comparison
@@ -72,9 +73,10 @@ def main(args: Sequence[str] | None = None, families: Sequence[Family] | None = 
         families: The sensors; all that there are if not given.
     """
     options = _parse(args)
-    for name, value in (("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST"),
-                        ("ROS_DOMAIN_ID", str(os.getpid() % 100 + 1))):
-        os.environ[name] = os.environ.get(name) or value
+    print("Starting; it takes some seconds until the first measurements come.", flush=True)
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    if not os.environ.get("ROS_DOMAIN_ID"):
+        os.environ["ROS_DOMAIN_ID"] = str(claim_domain())
     try:
         from sensor_tools.demo import recorder  # noqa: F401  (ROS is there)
         from sensor_tools.demo.families import FAMILIES
