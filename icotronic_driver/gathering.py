@@ -96,18 +96,20 @@ class Gatherer:
         self._conversion = conversion
         self._use = use
         self._begin = self._end = 0
-        self._frames: list[tuple[int, int]] = []
+        self._firsts: list[int] = []
+        self._steps: list[int] = []
         self._values: list[int] = []
         self._rest = NOTHING
 
     def take(self, stamp: int, step: int, values: tuple[int, ...]) -> None:
         """Take a frame: time of its first sample and from one to the next in ns, raw values."""
-        self._frames.append((stamp, step))
+        self._firsts.append(stamp)
+        self._steps.append(step)
         self._values += values
         if not self._begin <= stamp < self._end:
             self._begin = stamp - stamp % self._period
             self._end = self._begin + self._period
-            if len(self._frames) > 1 or len(self._rest):
+            if len(self._firsts) > 1 or len(self._rest):
                 self._hand_over()
 
     def finish(self) -> None:
@@ -120,7 +122,7 @@ class Gatherer:
 
     def is_late(self, now: int) -> bool:
         """Whether a period that has something is over since at least `LATE` at `now` in ns."""
-        return bool(self._frames or len(self._rest)) and now > self._end + LATE
+        return bool(self._firsts or len(self._rest)) and now > self._end + LATE
 
     def _hand_over(self) -> None:
         """Hand over all periods but the last, which may not be complete."""
@@ -130,22 +132,25 @@ class Gatherer:
 
     def _decode(self) -> Samples:
         """Return what was gathered, and forget the frames."""
-        if not self._frames:
+        if not self._firsts:
             return self._rest
-        first, step = np.array(self._frames, np.int64).T
         raw = np.array(self._values, np.uint16).reshape(-1, self._conversion.channels)
-        self._frames.clear()
-        self._values.clear()
+        first, step = np.array(self._firsts), np.array(self._steps)
         places = np.arange(len(raw) // len(first))
         stamps = (first[:, None] + step[:, None] * places).reshape(-1)
-        return Samples(np.concatenate((self._rest.stamps, stamps)), np.concatenate(
-            (self._rest.accelerations, self._conversion.accelerations(raw))))
+        for taken in (self._firsts, self._steps, self._values):
+            taken.clear()
+        accelerations = self._conversion.accelerations(raw)
+        if not len(self._rest):
+            return Samples(stamps, accelerations)
+        return Samples(np.concatenate((self._rest.stamps, stamps)),
+                       np.concatenate((self._rest.accelerations, accelerations)))
 
 
 def split_periods(samples: Samples, period: int) -> list[Samples]:
     """Return the samples of each period of so many ns since the epoch."""
     numbers = samples.stamps // period
-    edges = [0, *(np.flatnonzero(numbers[1:] != numbers[:-1]) + 1).tolist(), len(samples)]
+    edges = [0, *(np.flatnonzero(np.diff(numbers)) + 1).tolist(), len(samples)]
     return [Samples(samples.stamps[first:last], samples.accelerations[first:last])
             for first, last in itertools.pairwise(edges)]
 

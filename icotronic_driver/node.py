@@ -33,7 +33,7 @@ from icotronic_driver.streaming import AXES
 from icotronic_driver.values import CLOCK, decode_mac, encode_mac
 from msg_conversions.battery import to_battery_state
 from msg_conversions.imu import UNKNOWN_VARIANCE, ImuTemplate
-from msg_conversions.imu_batch import to_imu_batch
+from msg_conversions.imu_batch import ImuBatchTemplate
 from msg_conversions.temperature import to_temperature
 
 SIMULATED = "sim"
@@ -51,7 +51,7 @@ RECENT_TIME = 30.0  # s that count for whether all is well
 LOSS_LIMIT = 0.01  # share of the frames that may be lost without a warning
 QUEUE_DEPTH = 2000  # samples that a publisher keeps for slow subscribers, 0.2 s at the usual rate
 BATCH_DEPTH = 100  # batches, 2 s
-GATHERING_TIME = 0.01  # s for which frames wait for each other where nobody wants each at once
+GATHERING_TIME = 0.02  # s for which frames wait for each other where nobody wants each at once
 
 
 class IcotronicNode(DeviceNode, Listener):
@@ -225,10 +225,10 @@ class IcotronicNode(DeviceNode, Listener):
             yield Consumer(topic.get_subscription_count, _publisher(
                 template.serialised, topic.handle.publish_raw, conversion))
         if batch_period:
-            topic = self._topics["batch"]
+            topic, batch = self._topics["batch"], ImuBatchTemplate(frame_id)
 
             def publish(samples: Samples) -> None:
-                topic.publish(to_imu_batch(samples.stamps, samples.accelerations, frame_id))
+                topic.publish(batch.serialised(samples.stamps, samples.accelerations))
 
             gatherer = Gatherer(batch_period, conversion, publish)
             yield Consumer(topic.get_subscription_count, gatherer.take, gatherer)

@@ -9,9 +9,9 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 
-from rclpy.serialization import serialize_message
 from sensor_msgs.msg import Imu
 
+from msg_conversions.cdr import serialise
 from msg_conversions.header import to_header
 
 NOT_MEASURED = -1.0  # first element of a covariance (sensor_msgs/Imu)
@@ -46,7 +46,7 @@ class ImuTemplate:
 
     def __init__(self, variances: Sequence[float], frame_id: str) -> None:
         """Serialise the message once; see `to_imu` for the arguments."""
-        message = serialize_message(to_imu((0.0, 0.0, 0.0), variances, frame_id, 0))
+        message = serialise(to_imu((0.0, 0.0, 0.0), variances, frame_id, 0))
         self._head = message[:_STAMP.start]
         self._middle = message[_STAMP.stop:_ACCELERATION.start]
         self._tail = message[_ACCELERATION.stop:]

@@ -5,12 +5,13 @@ import struct
 
 import numpy as np
 import pytest
-from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Imu, PointCloud2, PointField
 
 from msg_conversions.battery import to_battery_state
+from msg_conversions.cdr import serialise
 from msg_conversions.imu import ImuTemplate, to_imu
-from msg_conversions.imu_batch import from_imu_batch, to_imu_batch
+from msg_conversions.imu_batch import ImuBatchTemplate, from_imu_batch
 from msg_conversions.point_cloud import to_point_cloud
 
 VARIANCES = (0.25, 1e6, 1e6)
@@ -22,7 +23,7 @@ def test_patched_bytes_are_those_of_the_message(frame_id):
     template = ImuTemplate(VARIANCES, frame_id)
     for stamp, acceleration in ((STAMP, (9.80665, -0.5, 1e-3)), (999_999_999, (0.0, 0.0, -2.0))):
         message = to_imu(acceleration, VARIANCES, frame_id, stamp)
-        assert template.serialised(stamp, *acceleration) == serialize_message(message)
+        assert template.serialised(stamp, *acceleration) == serialise(message)
 
 
 def test_an_imu_tells_what_it_does_not_measure():
@@ -37,11 +38,22 @@ def test_an_imu_tells_what_it_does_not_measure():
     assert imu.orientation.w == 1.0
 
 
+@pytest.mark.parametrize("frame_id", ["", "i", "imu", "imu_link", "a_rather_long_frame_name_1"])
+def test_the_bytes_of_a_batch_are_those_of_the_message(frame_id):
+    for count in (1, 190):
+        stamps = STAMP + 105_000 * np.arange(count)
+        accelerations = np.arange(3 * count, dtype=np.float32).reshape(-1, 3)
+        data = ImuBatchTemplate(frame_id).serialised(stamps, accelerations)
+        cloud = deserialize_message(data, PointCloud2)
+        assert (cloud.header.frame_id, cloud.width) == (frame_id, count)
+        assert serialise(cloud) == data
+
+
 def test_a_batch_is_a_cloud_with_a_point_per_sample():
     stamps = np.array([STAMP, STAMP + 105_000, STAMP + 7_000_000_001])
     accelerations = np.array([[1.5, 0, -2], [0.1, 0, 3], [4, 0, 5]], np.float32)
     cloud = deserialize_message(
-        serialize_message(to_imu_batch(stamps, accelerations, "imu_link")), PointCloud2)
+        ImuBatchTemplate("imu_link").serialised(stamps, accelerations), PointCloud2)
     assert (cloud.header.stamp.sec, cloud.header.stamp.nanosec) == (1_800_000_000, 123_456_789)
     assert (cloud.header.frame_id, cloud.height, cloud.width) == ("imu_link", 1, 3)
     assert (cloud.point_step, cloud.row_step, cloud.is_dense) == (20, 60, True)
