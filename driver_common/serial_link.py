@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import fcntl
+import math
 import os
+import re
 import socket
 import termios
 import time
+from typing import Any
 
 import serial
 from serial.tools import list_ports
@@ -18,6 +22,10 @@ BITS_PER_BYTE = 10  # 8N1
 WRITE_TIMEOUT = 1.0  # s
 HELD_UP = 0.02  # s by which a wait may be too long before the host counts as held up
 GRACE = 1.0  # s that are waited once more after that, at most
+NETWORK = ("socket", "rfc2217")  # URLs of ports elsewhere
+SCHEMES = (*NETWORK, "hwgrep")
+SILENCE = 10.0  # s without an answer over a network: its other end may be gone unnoticed
+SLICE = 0.01  # s of a wait where the port cannot change its time-out
 _ADVICE = {
     errno.ENOENT: "there is no such port{ports}; is it plugged in?",
     errno.EACCES: "no permission; add yourself to the group dialout with "
@@ -35,7 +43,10 @@ _ADVICE = {
 
 
 class SerialLink:
-    """A serial port, or any pyserial URL such as `socket://host:port`.
+    """A serial port: a device path, `hwgrep://` a part of its description, or one elsewhere.
+
+    A port elsewhere (`socket://host:port`, `rfc2217://host:port`) that has not answered for
+    `SILENCE` is opened again, because nothing else tells that its other end has gone.
 
     Args:
         port: Device path or URL.
@@ -49,17 +60,34 @@ class SerialLink:
         """Open the port for this process alone."""
         self.port = port
         self._baud_rate = baud_rate
+        self._scheme = port.partition("://")[0].lower() if "://" in port else ""
+        self._unanswered = math.inf  # monotonic time of the first request without any answer
         if not port:
             raise LinkError(f"serial_port is not set; give a device path{_other_ports()}, "
                             f"a URL such as socket://host:port, or sim://MODEL")
+        if self._scheme and self._scheme not in SCHEMES:
+            raise LinkError(f"cannot open {port}: {self._scheme}:// is not possible here; give a "
+                            f"device path, sim://MODEL, {', '.join(map('{}://'.format, SCHEMES))}")
+        self._serial = self._opened()
+
+    def _opened(self) -> Any:
+        """Return the open port of pyserial."""
+        # RFC 2217 has no write time-out, and negotiates anew when the other one changes.
+        negotiates = self._scheme == "rfc2217"
+        options: dict[str, Any] = {"timeout": SLICE} if negotiates else {
+            "timeout": 0, "write_timeout": WRITE_TIMEOUT, "exclusive": True}
         try:
-            self._serial = serial.serial_for_url(
-                port, baud_rate, timeout=0, write_timeout=WRITE_TIMEOUT, exclusive=True)
-        except (serial.SerialException, ValueError, OSError) as error:
-            raise LinkError(f"cannot open {port}: {_reason(port, error)}") from error
+            port = serial.serial_for_url(self.port, self._baud_rate, **options)
+        except (serial.SerialException, ValueError, TypeError, OSError, re.error) as error:
+            raise LinkError(f"cannot open {self.port}: {_reason(self.port, error)}") from error
         # Not on a pseudo-terminal, a socket, or with every driver.
         with contextlib.suppress(AttributeError, ValueError, OSError, NotImplementedError):
-            self._serial.set_low_latency_mode(True)
+            port.set_low_latency_mode(True)
+        # A lock keeps out who asks for it, this one everybody but root.
+        with contextlib.suppress(AttributeError, ValueError, OSError, NotImplementedError):
+            fcntl.ioctl(port.fileno(), termios.TIOCEXCL)
+        self._waits_in_slices = negotiates
+        return port
 
     @property
     def baud_rate(self) -> int:
@@ -79,6 +107,12 @@ class SerialLink:
 
     def write(self, data: bytes) -> None:
         """Send all bytes without a break."""
+        now = time.monotonic()
+        if self._scheme in NETWORK and now - self._unanswered > SILENCE:
+            self.close()
+            self._serial = self._opened()
+            self._unanswered = math.inf
+        self._unanswered = min(self._unanswered, now)
         with _Guard(self.port):
             self._serial.write(data)
 
@@ -90,21 +124,31 @@ class SerialLink:
         """
         with _Guard(self.port):
             waiting = self._serial.in_waiting
-            if waiting:
-                data: bytes = self._serial.read(waiting)
-                return data
-            first = self._first_byte(max(timeout, 0))
-            waiting = self._serial.in_waiting if first else 0
-            return first + (self._serial.read(waiting) if waiting else b"")
+            first = b"" if waiting else self._first_byte(max(timeout, 0))
+            waiting = waiting or (self._serial.in_waiting if first else 0)
+            data: bytes = first + (self._serial.read(waiting) if waiting else b"")
+        if data:
+            self._unanswered = math.inf
+        return data
 
     def _first_byte(self, timeout: float) -> bytes:
         start = time.monotonic()
-        self._serial.timeout = timeout
-        first: bytes = self._serial.read(1)
+        first = self._wait(timeout)
         held_up = time.monotonic() - start - timeout
         if not first and timeout and held_up > HELD_UP:
-            self._serial.timeout = min(held_up, GRACE)
+            first = self._wait(min(held_up, GRACE))
+        return first
+
+    def _wait(self, timeout: float) -> bytes:
+        """Return the first byte that comes in time, else b""."""
+        first: bytes
+        if not self._waits_in_slices:
+            self._serial.timeout = timeout
             first = self._serial.read(1)
+            return first
+        end = time.monotonic() + timeout
+        while not (first := self._serial.read(1)) and time.monotonic() < end:
+            pass
         return first
 
     def close(self) -> None:
@@ -131,13 +175,18 @@ class _Guard:
 
 
 def _reason(port: str, error: Exception) -> str:
-    number, cause = getattr(error, "errno", None), error.__context__
-    if isinstance(cause, socket.gaierror):
+    causes: list[BaseException] = [error]
+    while (cause := causes[-1].__context__) is not None:
+        causes.append(cause)
+    if any(isinstance(cause, socket.gaierror) for cause in causes):
         return "there is no such host; check its name"
-    if port.startswith("socket:") and isinstance(cause, (TypeError, ValueError, KeyError)):
-        return "a host and a port are needed, as in socket://host:port"
-    if number is None and isinstance(cause, (OSError, termios.error)):
-        number = cause.args[0]
+    scheme = port.partition("://")[0]
+    if scheme in NETWORK and any(isinstance(cause, (TypeError, ValueError, KeyError))
+                                 for cause in causes):
+        return f"a host and a port are needed, as in {scheme}://host:port"
+    number = next((cause.args[0] for cause in causes
+                   if isinstance(cause, (OSError, termios.error))
+                   and cause.args and isinstance(cause.args[0], int)), None)
     if number in _ADVICE:
         return _ADVICE[number].format(port=port, ports=_other_ports())
     if "disconnected" in str(error) or "returned no data" in str(error):

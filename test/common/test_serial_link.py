@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import socket
 import stat
@@ -10,7 +11,9 @@ import time
 import tty
 
 import pytest
+import serial.rfc2217
 
+from driver_common import serial_link
 from driver_common.errors import LinkError
 from driver_common.serial_link import SerialLink
 from driver_common.simulator.line import SPEEDS, SimulatedLine
@@ -145,7 +148,7 @@ def test_a_port_is_opened_for_one_program_alone(terminal, link):
     ("socket://no.such.host.invalid:1", "there is no such host; check its name"),
     ("socket://127.0.0.1", "a host and a port are needed, as in socket://host:port"),
     ("socket://127.0.0.1:port", "a host and a port are needed, as in socket://host:port"),
-    ("sucket://127.0.0.1:1", "invalid URL, protocol 'sucket' not known"),
+    ("sucket://127.0.0.1:1", "sucket:// is not possible here"),
 ])
 def test_a_port_that_cannot_be_opened_is_named_with_the_reason(port, words):
     error = error_of(port)
@@ -255,3 +258,99 @@ def test_a_simulated_line_that_was_closed_leaves_later_ones_alone(tmp_path):
     assert read_all(link, 2) == b"ba"
     link.close()
     second.close()
+
+
+# --- ports elsewhere -----------------------------------------------------------------------------
+
+class PortWithoutModemLines(serial.Serial):
+    """A port on a pseudo-terminal, which has no such lines."""
+
+    cts = dsr = ri = cd = False
+
+    def _update_rts_state(self):
+        pass
+
+    _update_dtr_state = _update_break_state = _update_rts_state
+
+
+class Rfc2217Server:
+    """A serial port offered over the network, with pyserial's own server side."""
+
+    def __init__(self, path):
+        self.port = PortWithoutModemLines(path, timeout=0.05)
+        self._server = socket.create_server(("127.0.0.1", 0))
+        self.url = f"rfc2217://127.0.0.1:{self._server.getsockname()[1]}"
+        threading.Thread(target=self._serve, daemon=True).start()
+
+    def _serve(self):
+        self._connection, _ = self._server.accept()
+        manager = serial.rfc2217.PortManager(self.port, self)
+        threading.Thread(target=self._receive, args=[manager], daemon=True).start()
+        with contextlib.suppress(OSError):
+            while data := self._connection.recv(1024):
+                self.port.write(b"".join(manager.filter(data)))
+
+    def _receive(self, manager):
+        with contextlib.suppress(OSError, TypeError):  # closed
+            while True:
+                if data := self.port.read(self.port.in_waiting or 1):
+                    self.write(b"".join(manager.escape(data)))
+
+    def write(self, data):
+        self._connection.sendall(data)
+
+    def close(self):
+        self._connection.close()
+        self._server.close()
+
+
+def test_a_port_over_rfc_2217(terminal):
+    server = Rfc2217Server(terminal.path)
+    link = SerialLink(server.url, 57600)
+    assert server.port.baudrate == 57600
+    everything = bytes(range(256))
+    link.write(everything)
+    received = b""
+    while len(received) < 256:
+        received += terminal.read()
+    assert received == everything
+    terminal.write(everything)
+    assert read_all(link, 256) == everything
+    link.baud_rate = 9600
+    assert server.port.baudrate == 9600
+    assert link.read(0.05) == b""
+    link.close()
+    server.close()
+
+
+def test_a_network_port_that_is_silent_is_opened_again(monkeypatch):
+    monkeypatch.setattr(serial_link, "SILENCE", 0.0)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        link = SerialLink(f"socket://127.0.0.1:{server.getsockname()[1]}", 115200)
+        dead, _ = server.accept()
+        link.write(b"first")  # into a connection of which the other end has gone
+        link.write(b"second")
+        alive, _ = server.accept()
+        assert alive.recv(100) == b"second"
+        alive.sendall(b"answer")
+        assert read_all(link, 6) == b"answer"
+        link.write(b"third")  # the answer showed that it lives
+        assert alive.recv(100) == b"third"
+        link.close()
+        for connection in dead, alive:
+            connection.close()
+
+
+@pytest.mark.parametrize(("port", "text"), [
+    ("loop://", "loop:// is not possible here; give a device path, sim://MODEL, socket://"),
+    ("spy:///dev/ttyS0?file={file}", "spy:// is not possible here"),
+    ("alt:///dev/ttyS0?class=VTIMESerial", "alt:// is not possible here"),
+    ("hwgrep://no such thing", "no ports found matching"),
+    ("hwgrep://(", "missing )"),
+    ("rfc2217://127.0.0.1", "a host and a port are needed, as in rfc2217://host:port"),
+    ("rfc2217://127.0.0.1:1?x=1", "a host and a port are needed, as in rfc2217://host:port"),
+    ("{file}", "there is no such port")])
+def test_a_port_that_cannot_be_is_refused_and_nothing_is_made(port, text, tmp_path):
+    file = tmp_path / "file"
+    assert text in error_of(port.format(file=file))
+    assert not list(tmp_path.iterdir())
