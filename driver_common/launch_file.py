@@ -5,7 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from launch import LaunchContext, LaunchDescription
-from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.actions import (
+    DeclareLaunchArgument,
+    GroupAction,
+    IncludeLaunchDescription,
+    OpaqueFunction,
+    PopLaunchConfigurations,
+    PushLaunchConfigurations,
+)
+from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
@@ -17,7 +25,8 @@ PACKAGE = "industrial_sensor_drivers"
 def describe_driver(executable: str, name: str, link: Mapping[str, str]) -> LaunchDescription:
     """Return the description that starts one driver; it connects and measures by itself.
 
-    Its arguments are `params_file`, `name`, `namespace` and those of `link`.
+    Its arguments are `params_file`, `name`, `namespace` and those of `link`. Their defaults end
+    with it: launch would keep them for the next file that is included.
 
     Args:
         executable: The program.
@@ -34,9 +43,9 @@ def describe_driver(executable: str, name: str, link: Mapping[str, str]) -> Laun
             name=LaunchConfiguration("name"), namespace=LaunchConfiguration("namespace"),
             parameters=[LaunchConfiguration("params_file"), *([given] if given else [])])]
 
-    params_file = PathJoinSubstitution([FindPackageShare(PACKAGE), "config", f"{name}.yaml"])
     return LaunchDescription([
-        DeclareLaunchArgument("params_file", default_value=params_file,
+        PushLaunchConfigurations(),
+        DeclareLaunchArgument("params_file", default_value=_shared("config", f"{name}.yaml"),
                               description="Parameter file."),
         *(DeclareLaunchArgument(key, default_value="",
                                 description=f"{description}; empty = from the file.")
@@ -44,4 +53,24 @@ def describe_driver(executable: str, name: str, link: Mapping[str, str]) -> Laun
         DeclareLaunchArgument("namespace", default_value="", description="Of the node."),
         DeclareLaunchArgument("name", default_value=name, description="Of the node."),
         OpaqueFunction(function=make_node),
+        PopLaunchConfigurations(),
     ])
+
+
+def include_driver(name: str, params_file: str, link: Mapping[str, str]) -> GroupAction:
+    """Return what includes the launch file of a driver, with arguments that end with it.
+
+    Args:
+        name: Name of the driver.
+        params_file: Name of its parameter file in config/.
+        link: Arguments of the driver, each with the argument of the whole that it follows.
+    """
+    arguments = {"params_file": _shared("config", params_file),
+                 **{own: LaunchConfiguration(outer) for own, outer in link.items()}}
+    return GroupAction([IncludeLaunchDescription(
+        PythonLaunchDescriptionSource(_shared("launch", f"{name}.launch.py")),
+        launch_arguments=arguments.items())])
+
+
+def _shared(*path: str) -> PathJoinSubstitution:
+    return PathJoinSubstitution([FindPackageShare(PACKAGE), *path])

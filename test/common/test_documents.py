@@ -95,14 +95,14 @@ def test_settings_that_differ_by_a_number_share_a_line(rows_, text):
     assert all(name in DRIVERS["isys_radar"].node.ALL_SETTINGS for name in rows_)
 
 
-@pytest.mark.parametrize("path", sorted((ROOT / "launch").glob("*.py")), ids=lambda p: p.name)
-def test_launch_files_start_what_there_is(path):
+@pytest.mark.parametrize("name", DRIVERS)
+def test_launch_files_start_what_there_is(name):
+    path = ROOT / "launch" / f"{name}.launch.py"
     text = path.read_text()
     compile(text, str(path), "exec")
-    ((program, name),) = re.findall(r'describe_driver\("(\w+)", "(\w+)"', text)
-    assert f'"{program} = ' in (ROOT / "setup.py").read_text()
+    assert [(f"{name}_node", name)] == re.findall(r'describe_driver\("(\w+)", "(\w+)"', text)
+    assert f'"{name}_node = ' in (ROOT / "setup.py").read_text()
     assert (ROOT / "config" / f"{name}.yaml").exists()
-    assert path.name == f"{name}.launch.py"
 
 
 @pytest.mark.parametrize(("name", "link"), [
