@@ -29,6 +29,7 @@ setup(
     ],
     entry_points={
         "console_scripts": [
+            "convert_imu = sensor_tools.convert_imu:main",
             "demo = sensor_tools.demo.program:main",
             "icotronic_node = icotronic_driver.node:main",
             "isys_radar_node = isys_radar_driver.node:main",

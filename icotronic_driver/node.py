@@ -32,7 +32,7 @@ from icotronic_driver.simulator.line import simulated_network
 from icotronic_driver.streaming import AXES
 from icotronic_driver.values import CLOCK, decode_mac, encode_mac
 from msg_conversions.battery import to_battery_state
-from msg_conversions.imu import UNKNOWN_VARIANCE, ImuTemplate
+from msg_conversions.imu import ImuTemplate, variances_of
 from msg_conversions.imu_batch import ImuBatchTemplate
 from msg_conversions.temperature import to_temperature
 
@@ -216,10 +216,8 @@ class IcotronicNode(DeviceNode, Listener):
         """Yield those who take the samples of a stream."""
         frame_id, batch_period = self.option("frame_id"), self.option("batch_period")
         if "imu" in self._topics:
-            variances = [UNKNOWN_VARIANCE] * 3
-            for axis in axes:
-                variances[axis % 3] = self.option("linear_acceleration_stddev") ** 2
-            template = ImuTemplate(variances, frame_id)
+            template = ImuTemplate(variances_of(
+                [axis % 3 for axis in axes], self.option("linear_acceleration_stddev")), frame_id)
             topic = self._topics["imu"]
             # publish() itself costs twice as much, because it looks at what it was given.
             yield Consumer(topic.get_subscription_count, _publisher(

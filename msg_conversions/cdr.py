@@ -11,16 +11,21 @@ import struct
 from typing import Any
 
 ENCAPSULATION = b"\0\1\0\0"  # CDR, little endian; alignment counts from behind it
+WORD = 4  # bytes
+
 _FORMATS = {"boolean": "?", "uint8": "B", "int8": "b", "uint16": "H", "int16": "h", "uint32": "I",
             "int32": "i", "uint64": "Q", "int64": "q", "float": "f", "double": "d"}
 _SEVERAL = re.compile(r"(sequence<)?(?P<kind>[^,\[]+?)(?(1)(, \d+)?>|\[\d+\])")
 
 
 def serialise(message: Any) -> bytes:
-    """Return a message as `serialize_message` does, with zeros between the fields."""
+    """Return a message as `serialize_message` does, with zeros between the fields.
+
+    It is filled up to whole words, because the middleware would do that.
+    """
     data = bytearray(ENCAPSULATION)
     _append_message(data, message)
-    return bytes(data)
+    return bytes(data + bytes(-len(data) % WORD))
 
 
 def _append_message(data: bytearray, message: Any) -> None:

@@ -7,7 +7,7 @@ stream only stamp and acceleration change, so one message is serialised, and the
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from sensor_msgs.msg import Imu
 
@@ -39,6 +39,19 @@ def to_imu(acceleration: Sequence[float], variances: Sequence[float], frame_id: 
         setattr(imu.linear_acceleration, name, float(acceleration[axis]))
         imu.linear_acceleration_covariance[4 * axis] = variances[axis]
     return imu
+
+
+def variances_of(axes: Iterable[int], stddev: float) -> list[float]:
+    """Return the variances of x, y and z in m²/s⁴.
+
+    Args:
+        axes: Those that are measured: 0 = x, 1 = y, 2 = z.
+        stddev: Their standard deviation in m/s²; 0 = unknown.
+    """
+    variances = [UNKNOWN_VARIANCE] * 3
+    for axis in axes:
+        variances[axis] = stddev ** 2
+    return variances
 
 
 class ImuTemplate:

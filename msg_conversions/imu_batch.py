@@ -21,7 +21,7 @@ NANOSECONDS = 1_000_000_000
 _U32 = struct.Struct("<I")
 _TIME = struct.Struct("<iI")
 _STAMP = slice(4, 12)  # behind the header of the encapsulation
-_TAIL_SIZE = 2 * _U32.size + 1  # bytes in a row, bytes of data, is_dense
+_TAIL_SIZE = 3 * _U32.size  # bytes in a row, bytes of data, is_dense
 
 
 class ImuBatchTemplate:
@@ -39,7 +39,7 @@ class ImuBatchTemplate:
         frame_end = _STAMP.stop + _U32.size + len(frame_id.encode()) + 1
         width = frame_end + -frame_end % _U32.size + _U32.size  # behind the height
         self._parts = (empty[:_STAMP.start], empty[_STAMP.stop:width],
-                       empty[width + _U32.size:-_TAIL_SIZE], empty[-1:])
+                       empty[width + _U32.size:-_TAIL_SIZE], empty[-_U32.size:])
 
     def serialised(self, stamps: npt.NDArray[np.int64],
                    accelerations: npt.NDArray[np.float32]) -> bytes:

@@ -18,7 +18,7 @@ from msg_conversions.cdr import serialise
                       data=[1.0, -2.0])], ids=lambda message: type(message).__name__)
 def test_ros_reads_the_same_message(message):
     data = serialise(message)
-    assert len(data) == len(serialize_message(message))
+    assert len(data) % 4 == 0 <= len(data) - len(serialize_message(message)) < 4
     assert deserialize_message(data, type(message)) == message
     assert serialise(deserialize_message(data, type(message))) == data
 

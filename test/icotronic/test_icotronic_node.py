@@ -30,6 +30,8 @@ from icotronic_driver.simulator.line import SimulatedIcotronic, simulated_networ
 from icotronic_driver.streaming import STANDARD_GRAVITY
 from icotronic_driver.values import AdcConfiguration
 from msg_conversions.imu_batch import from_imu_batch
+from sensor_tools import convert_imu
+from sensor_tools.bags import Record, read_bag, write_bag
 
 DEADLINE = 15.0  # s; far more than anything takes, also on a busy machine
 MODULE, NAME, STATUS = "icotronic_driver.node", "/icotronic", "icotronic: sensor"
@@ -544,9 +546,10 @@ def batches(ros):
 
 
 def test_a_batch_holds_exactly_the_samples_that_are_published_one_by_one(
-        ros, start, launch, samples, batches):
+        ros, start, launch, samples, batches, tmp_path):
     server = start()
-    process = launch(at(server, autostart=False, channels="xz", **{"axis.z": "-y"}))
+    process = launch(at(server, autostart=False, channels="xz", linear_acceleration_stddev=0.5,
+                        **{"axis.z": "-y"}))
     node = ros.remote(NAME)
     assert node.change_state("configure")
     process.wait_for_line("connected to")
@@ -575,6 +578,19 @@ def test_a_batch_holds_exactly_the_samples_that_are_published_one_by_one(
     assert all(len(set(period)) == 1 for period in periods)
     assert len({period[0] for period in periods}) == len(periods)
     process.stop()
+    recorded = {"samples": [Record(f"{NAME}/imu/data_raw", "sensor_msgs/msg/Imu", data, stamp)
+                            for data, stamp in zip(samples.messages, stamps.tolist(), strict=True)],
+                "batch": [Record(f"{NAME}/imu/batch", "sensor_msgs/msg/PointCloud2", data,
+                                 int(part[-1]))
+                          for data, (part, _) in zip(batches.messages, parts, strict=True)]}
+    for kind, records in recorded.items():
+        with write_bag(tmp_path / kind) as write:
+            for record in records:
+                write(record)
+    for source, target in (("samples", "batch"), ("batch", "samples")):
+        convert_imu.main([str(tmp_path / source), str(tmp_path / f"{target} again"), "--to", target,
+                          "--stddev", "0.5"])
+        assert list(read_bag(tmp_path / f"{target} again")) == recorded[target]
 
 
 def test_with_batches_alone_no_sample_gets_lost(ros, start, launch, batches):

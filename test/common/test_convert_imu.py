@@ -1,0 +1,39 @@
+"""What the conversion of bags refuses; what it gives is tested together with the node."""
+
+import pytest
+from std_msgs.msg import String
+
+from msg_conversions.cdr import serialise
+from sensor_tools import convert_imu
+from sensor_tools.bags import Record, read_bag, write_bag
+
+
+@pytest.fixture
+def bag(tmp_path):
+    """A bag with nothing to convert."""
+    with write_bag(tmp_path / "bag") as write:
+        write(Record("/chatter", "std_msgs/msg/String", serialise(String(data="hello")), 5))
+    return tmp_path / "bag"
+
+
+def test_a_bag_holds_what_was_written(bag):
+    (record,) = read_bag(bag)
+    assert record == ("/chatter", "std_msgs/msg/String", serialise(String(data="hello")), 5)
+
+
+@pytest.mark.parametrize(("arguments", "reason"), [
+    (["bag", "new"], "bag has no messages of a topic …/imu/batch"),
+    (["bag", "new", "--to", "batch"], "bag has no messages of a topic …/imu/data_raw"),
+    (["other", "new"], "there is no bag other"), (["empty", "new"], "cannot read the bag empty: ")])
+def test_what_cannot_be_converted_is_told(bag, monkeypatch, capsys, arguments, reason):
+    monkeypatch.chdir(bag.parent)
+    (bag.parent / "empty").mkdir()
+    with pytest.raises(SystemExit, match="1"):
+        convert_imu.main(arguments)
+    assert reason in capsys.readouterr().err
+    assert not (bag.parent / "new").exists()
+
+
+def test_a_bag_is_not_overwritten(bag):
+    with pytest.raises(Exception, match="exists already; name another"), write_bag(bag):
+        pass
