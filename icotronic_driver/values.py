@@ -9,6 +9,7 @@ from enum import IntEnum
 from typing import NamedTuple
 
 from driver_common.errors import FrameError, SettingError
+from driver_common.text import printable_text
 
 CLOCK = 38.4e6  # Hz, of the ADC
 
@@ -214,7 +215,7 @@ def unpack_exactly(data: bytes, form: str) -> tuple[int, ...]:
 
 def decode_text(data: bytes) -> str:
     """Return the text in bytes that are padded with zeros (errata C13)."""
-    return data.split(b"\0", 1)[0].decode("utf-8", errors="replace")
+    return printable_text(data, "utf-8")
 
 
 def encode_text(text: str, length: int) -> bytes:

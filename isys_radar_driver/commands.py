@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from driver_common.errors import FrameError, SettingError
 from driver_common.settings import Raw, Record
+from driver_common.text import printable_text
 from isys_radar_driver.frames import (
     FIRST_ADDRESS,
     LAST_ADDRESS,
@@ -99,7 +100,7 @@ def _nothing(pdu: bytes) -> None:
 
 
 def _text(pdu: bytes) -> str:
-    return pdu.split(b"\0", 1)[0].decode("ascii", errors="replace").strip()
+    return printable_text(pdu.split(b"\0", 1)[0].strip())
 
 
 def _version(pdu: bytes) -> Version:

@@ -10,6 +10,7 @@ from typing import Generic, TypeVar
 
 from driver_common.errors import FrameError, SettingError
 from driver_common.settings import Raw, Record
+from driver_common.text import printable_text
 from uc4000_driver.telegram import FIRST_ADDRESS, LAST_ADDRESS, Request
 
 T = TypeVar("T")
@@ -114,7 +115,7 @@ def _address(data: bytes) -> int:
 
 
 def _text(data: bytes) -> str:
-    return data.split(b"\0", 1)[0].decode("ascii", errors="replace").strip()
+    return printable_text(data.split(b"\0", 1)[0].strip())
 
 
 @dataclass(frozen=True)

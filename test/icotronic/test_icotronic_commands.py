@@ -245,7 +245,7 @@ def test_what_the_device_has_already_is_not_written() -> None:
 
 
 @pytest.mark.parametrize(("name", "value", "words"), [
-    ("name", "Test-STH1", "at most 8 bytes"), ("name", 5, "a text"),
+    ("name", "Test-STH1", "at most 8 bytes"), ("name", True, "a text"),
     ("adc.prescaler", 0, "1 … 127"), ("adc.prescaler", 128, "1 … 127"),
     ("adc.acquisition_time", 5, "4 cycles and 8 cycles"), ("adc.oversampling_rate", 8192, "4096"),
     ("adc.reference_voltage", 3.0, "one of 1.25 V, 1.65 V"),

@@ -373,7 +373,7 @@ def test_a_value_of_a_wrong_type_says_what_is_expected(setting: Setting) -> None
         bool: (1, "true or false"),
         int: (1.5, "a whole number"),
         float: (True, "a number"),
-        str: (7, "one of " + ", ".join(setting.choices) if setting.choices else "a text"),
+        str: (True, "one of " + ", ".join(setting.choices) if setting.choices else "a text"),
     }[setting.kind]
     with pytest.raises(SettingError) as caught:
         setting.encode(wrong)
