@@ -33,6 +33,7 @@ setup(
             "demo = sensor_tools.demo.program:main",
             "icotronic_node = icotronic_driver.node:main",
             "isys_radar_node = isys_radar_driver.node:main",
+            "record_qos = sensor_tools.record_qos:main",
             "simulate = sensor_tools.simulate:main",
             "uc4000_node = uc4000_driver.node:main",
         ],

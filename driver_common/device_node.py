@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -55,6 +55,13 @@ class Simulator(Protocol):
         """End them."""
 
 
+class Topic(NamedTuple):
+    """A topic that a node publishes for each sensor: message type, and messages that it keeps."""
+
+    kind: Any
+    depth: int = 10
+
+
 class DeviceNode(LifecycleNode):
     """A driver: a bus with one or more devices.
 
@@ -71,6 +78,7 @@ class DeviceNode(LifecycleNode):
     BUS_OPTIONS: Sequence[Option] = ()
     SENSOR_OPTIONS: Sequence[Option] = ()
     ALL_SETTINGS: Mapping[str, Setting] = {}
+    TOPICS: Mapping[str, Topic] = {}
 
     def __init__(self, name: str) -> None:
         """Declare the driver's own parameters.
@@ -397,12 +405,13 @@ class DeviceNode(LifecycleNode):
 
     # --- interfaces ---
 
-    def add_publisher(self, kind: Any, sensor: str, name: str, depth: int = 10) -> Any:
-        """Create a reliable publisher whose QoS can be overridden; gone at clean-up.
+    def add_publisher(self, sensor: str, name: str) -> Any:
+        """Create the reliable publisher of a topic, whose QoS can be overridden; gone at clean-up.
 
         Raises:
             SettingError: An override is not acceptable.
         """
+        kind, depth = self.TOPICS[name]
         topic = self.topic(sensor, name)
         try:
             publisher = self.create_publisher(

@@ -17,7 +17,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from sensor_msgs.msg import BatteryState, Imu, PointCloud2, Temperature
 
 from driver_common import diagnostics
-from driver_common.device_node import FRAME_ID, TIME_OFFSET, DeviceNode, run
+from driver_common.device_node import FRAME_ID, TIME_OFFSET, DeviceNode, Topic, run
 from driver_common.settings import Option
 from icotronic_driver.commands import parse_request
 from icotronic_driver.eeprom import PAGE_NAMES, Field, FieldValue
@@ -50,6 +50,8 @@ RECEIVERS = {"sth": STH_1, "stu": STU_1}
 RECENT_TIME = 30.0  # s that count for whether all is well
 LOSS_LIMIT = 0.01  # share of the frames that may be lost without a warning
 QUEUE_DEPTH = 2000  # samples that a publisher keeps for slow subscribers, 0.2 s at the usual rate
+LEAST_QUEUE = 500  # samples, 50 ms
+RECORDER = "rosbag2_recorder"  # name of the node of 'ros2 bag record'
 BATCH_DEPTH = 100  # batches, 2 s
 GATHERING_TIME = 0.02  # s for which frames wait for each other where nobody wants each at once
 
@@ -109,12 +111,16 @@ class IcotronicNode(DeviceNode, Listener):
         TIME_OFFSET,
     )
     ALL_SETTINGS = SETTINGS
+    TOPICS: Mapping[str, Topic] = {
+        "imu/batch": Topic(PointCloud2, BATCH_DEPTH), "imu/data_raw": Topic(Imu, QUEUE_DEPTH),
+        "battery": Topic(BatteryState), "temperature": Topic(Temperature)}
 
     def __init__(self) -> None:
         """Declare the parameters; raises SettingError."""
         self._stream_options: list[Any] = []
         self._topics: dict[str, Any] = {}
         self._stream = Stream((), 1, 0)
+        self._told_queues: set[str] = set()
         self._history: deque[_Counts] = deque()
         super().__init__("icotronic")
 
@@ -164,11 +170,11 @@ class IcotronicNode(DeviceNode, Listener):
     def make_interfaces(self, sensor: str) -> None:
         """Create topics and services."""
         self._topics = {
-            "batch": self.add_publisher(PointCloud2, sensor, "imu/batch", depth=BATCH_DEPTH),
-            "battery_voltage": self.add_publisher(BatteryState, sensor, "battery"),
-            "temperature": self.add_publisher(Temperature, sensor, "temperature")}
+            "batch": self.add_publisher(sensor, "imu/batch"),
+            "battery_voltage": self.add_publisher(sensor, "battery"),
+            "temperature": self.add_publisher(sensor, "temperature")}
         if self.option("publish_samples"):
-            self._topics["imu"] = self.add_publisher(Imu, sensor, "imu/data_raw", QUEUE_DEPTH)
+            self._topics["imu"] = self.add_publisher(sensor, "imu/data_raw")
         super().make_interfaces(sensor)
         for name, action in (
                 ("scan", self._scan),
@@ -242,6 +248,24 @@ class IcotronicNode(DeviceNode, Listener):
             self._stream.finish()
         at_once = self._stream.look(time.time_ns())
         sensor.options.may_wait = 0.0 if at_once else GATHERING_TIME
+
+    def _publish_diagnostics(self) -> None:
+        super()._publish_diagnostics()
+        self._warn_of_small_queues()
+
+    def _warn_of_small_queues(self) -> None:
+        """Say once of each subscriber that it will lose single samples, where that can be seen."""
+        topic = self._topics.get("imu")
+        if self.bus is None or topic is None or not topic.get_subscription_count():
+            return
+        for subscriber in self.get_subscriptions_info_by_topic(topic.topic_name):
+            name = subscriber.node_name
+            complaint = queue_complaint(name, subscriber.qos_profile.depth)
+            if complaint and name not in self._told_queues:
+                self._told_queues.add(name)
+                self.get_logger().warning(
+                    f"{name} subscribes to {topic.topic_name} {complaint}; use imu/batch, or see "
+                    "config/record_qos.yaml")
 
     def _axes(self, sensor: Sensor) -> list[int]:
         """Return the signed axis of each channel."""
@@ -408,6 +432,20 @@ def _publisher(serialise: Callable[[int, float, float, float], bytes],
             stamp += step
 
     return publish_samples
+
+
+def queue_complaint(subscriber: str, depth: int) -> str:
+    """Return what is wrong with a subscriber's queue for single samples, "" where nothing is known.
+
+    Args:
+        subscriber: Name of its node.
+        depth: Messages that it keeps; 0 = the middleware does not tell, as Fast DDS.
+    """
+    if 0 < depth < LEAST_QUEUE:
+        return f"with a queue of {depth} messages, which is too small for this stream"
+    if not depth and subscriber.startswith(RECORDER):
+        return "and loses samples if it has the usual queue of 10 messages"
+    return ""
 
 
 def _collide(axes: Sequence[int]) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from sensor_msgs.msg import PointCloud2, Range, Temperature
 from std_msgs.msg import Float32MultiArray
 
 from driver_common import diagnostics
-from driver_common.device_node import FRAME_ID, TIME_OFFSET, DeviceNode, run
+from driver_common.device_node import FRAME_ID, TIME_OFFSET, DeviceNode, Topic, run
 from driver_common.settings import Option, Value
 from isys_radar_driver import commands
 from isys_radar_driver.commands import Command, RangeList
@@ -33,11 +33,10 @@ POSITIVE_VELOCITY = {"approaching": -1, "receding": 1}  # to the sign of ROS (er
 POSITIVE_ANGLE = {"left": 1, "right": -1}  # errata I21
 RESOLUTIONS = {"auto": 0, "16": 16, "32": 32}
 MODEL_TOPICS = (
-    (commands.READ_RANGE_LIST, Range, ("range",)),
-    (commands.READ_RANGE_LIST, Temperature, ("temperature",)),
-    (commands.READ_DSP_TEMPERATURE, Temperature, ("dsp_temperature", "rfe_temperature")),
-    (commands.READ_DIGITAL_OUTPUTS, Float32MultiArray, ("digital_outputs",)),
-    (commands.READ_RAW, Float32MultiArray, ("raw_signals",)),
+    (commands.READ_RANGE_LIST, ("range", "temperature")),
+    (commands.READ_DSP_TEMPERATURE, ("dsp_temperature", "rfe_temperature")),
+    (commands.READ_DIGITAL_OUTPUTS, ("digital_outputs",)),
+    (commands.READ_RAW, ("raw_signals",)),
 )
 PWM_STEP = 0.01  # m or m/s, table 35
 
@@ -87,6 +86,10 @@ class IsysRadarNode(DeviceNode, Listener):
                description="Address that the service ~/change_address gives the sensor"),
     )
     ALL_SETTINGS = ALL_SETTINGS
+    TOPICS: Mapping[str, Topic] = {
+        "points": Topic(PointCloud2), "range": Topic(Range), "temperature": Topic(Temperature),
+        "dsp_temperature": Topic(Temperature), "rfe_temperature": Topic(Temperature),
+        "digital_outputs": Topic(Float32MultiArray), "raw_signals": Topic(Float32MultiArray)}
 
     def __init__(self) -> None:
         """Declare the parameters; raises SettingError."""
@@ -140,7 +143,7 @@ class IsysRadarNode(DeviceNode, Listener):
 
     def make_interfaces(self, sensor: str) -> None:
         """Create topics and services of a sensor."""
-        self._publishers_of[sensor] = {"points": self.add_publisher(PointCloud2, sensor, "points")}
+        self._publishers_of[sensor] = {"points": self.add_publisher(sensor, "points")}
         super().make_interfaces(sensor)
         for name, action in (
                 ("preview_save", self._preview_save),
@@ -162,11 +165,11 @@ class IsysRadarNode(DeviceNode, Listener):
     def add_device_interfaces(self, radar: Radar) -> None:
         """Create the topics that the radar's model can serve."""
         publishers = self._publishers_of[radar.options.name]
-        for command, kind, names in MODEL_TOPICS:
+        for command, names in MODEL_TOPICS:
             if radar.model is not None and radar.model.supports(command):
                 for name in names:
                     if name not in publishers:
-                        publishers[name] = self.add_publisher(kind, radar.options.name, name)
+                        publishers[name] = self.add_publisher(radar.options.name, name)
 
     # --- what the bus reports, in its thread ---
 

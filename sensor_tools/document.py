@@ -22,6 +22,7 @@ from icotronic_driver.settings import SETTINGS
 from isys_radar_driver.models import MODELS
 from isys_radar_driver.node import IsysRadarNode
 from isys_radar_driver.settings import settings_of
+from sensor_tools import record_qos
 from uc4000_driver.node import Uc4000Node
 from uc4000_driver.settings import ALL_SETTINGS as UC4000_SETTINGS
 
@@ -263,6 +264,7 @@ def documents() -> dict[Path, str]:
     for driver in DRIVERS:
         files[ROOT / "config" / f"{driver.name}.yaml"] = parameter_file(driver)
         files[ROOT / "docs" / driver.table] = table(driver)
+    files[ROOT / "config" / "record_qos.yaml"] = record_qos.profiles(record_qos.USUAL)
     return files
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from math import pi
@@ -13,7 +13,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from sensor_msgs.msg import Range, Temperature
 
 from driver_common import diagnostics
-from driver_common.device_node import FRAME_ID, TIME_OFFSET, DeviceNode, run
+from driver_common.device_node import FRAME_ID, TIME_OFFSET, DeviceNode, Topic, run
 from driver_common.settings import Option
 from msg_conversions.range import (
     NO_ECHO_VALUES,
@@ -79,6 +79,7 @@ class Uc4000Node(DeviceNode, Listener):
                description="Address that the service ~/change_address gives the sensor"),
     )
     ALL_SETTINGS = ALL_SETTINGS
+    TOPICS: Mapping[str, Topic] = {"range": Topic(Range), "temperature": Topic(Temperature)}
 
     def __init__(self) -> None:
         """Declare the parameters; raises SettingError."""
@@ -132,8 +133,8 @@ class Uc4000Node(DeviceNode, Listener):
         """Create topics and services of a sensor."""
         super().make_interfaces(sensor)
         self._publishers_of[sensor] = {
-            "range": self.add_publisher(Range, sensor, "range"),
-            "temperature": self.add_publisher(Temperature, sensor, "temperature")}
+            "range": self.add_publisher(sensor, "range"),
+            "temperature": self.add_publisher(sensor, "temperature")}
         self.add_trigger(sensor, "identify", lambda: self._identify(self.device(sensor)))
         self.add_trigger(sensor, "change_address",
                          lambda: self._change_address(self.device(sensor)))

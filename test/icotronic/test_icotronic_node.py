@@ -24,7 +24,7 @@ from driver_common.simulator.bus import CanFrame
 from icotronic_driver import commands
 from icotronic_driver.identifier import STU_1
 from icotronic_driver.line import STREAM_ID
-from icotronic_driver.node import IcotronicNode
+from icotronic_driver.node import IcotronicNode, queue_complaint
 from icotronic_driver.settings import SETTINGS
 from icotronic_driver.simulator.line import SimulatedIcotronic, simulated_network
 from icotronic_driver.streaming import STANDARD_GRAVITY
@@ -591,6 +591,26 @@ def test_a_batch_holds_exactly_the_samples_that_are_published_one_by_one(
         convert_imu.main([str(tmp_path / source), str(tmp_path / f"{target} again"), "--to", target,
                           "--stddev", "0.5"])
         assert list(read_bag(tmp_path / f"{target} again")) == recorded[target]
+
+
+@pytest.mark.parametrize(("name", "depth", "complaint"), [
+    ("listener", 10, "with a queue of 10 messages, which is too small"), ("listener", 2000, ""),
+    ("listener", 0, ""), ("rosbag2_recorder", 2000, ""), ("rosbag2_recorder", 0, "loses samples")])
+def test_a_small_queue_is_seen_where_the_middleware_shows_it(name, depth, complaint):
+    assert complaint in queue_complaint(name, depth)
+    assert bool(complaint) == bool(queue_complaint(name, depth))
+
+
+def test_a_recorder_of_single_samples_is_warned_once(station):
+    line = len(station.process.lines)
+    recorder = rclpy.create_node("rosbag2_recorder", context=station.ros.node.context)
+    recorder.create_subscription(Imu, f"{SLOW}/imu/data_raw", lambda message: None, 10)
+    warning = f"rosbag2_recorder subscribes to {SLOW}/imu/data_raw and loses samples if"
+    assert "use imu/batch" in station.process.wait_for_line(warning, line)
+    station.wait_for_status(lambda status: True)
+    station.wait_for_status(lambda status: True)
+    assert station.process.log.count(warning) == 1
+    recorder.destroy_node()
 
 
 def test_with_batches_alone_no_sample_gets_lost(ros, start, launch, batches):
