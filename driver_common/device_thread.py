@@ -63,6 +63,9 @@ class Interruptible(Protocol):
     def interrupt(self) -> None:
         """Have the present step end soon with a DriverError; called from another thread."""
 
+    def while_waiting(self, task: Callable[[], None]) -> None:
+        """Have `task` done now and then within a long step; it cannot have the link."""
+
 
 class DeviceThread(threading.Thread):
     """Opens a bus, polls it, and opens it again after errors, for ever.
@@ -88,6 +91,8 @@ class DeviceThread(threading.Thread):
         self._jobs: queue.SimpleQueue[tuple[Callable[[], Any], Future[Any]] | None] = (
             queue.SimpleQueue())
         self._stopping = False
+        if isinstance(bus, Interruptible):
+            bus.while_waiting(self._run_between)
 
     def call(self, job: Callable[[], T], timeout: float = CALL_TIMEOUT) -> T:
         """Run `job` in the thread of the bus and return its result, or raise what it raises."""
@@ -141,6 +146,11 @@ class DeviceThread(threading.Thread):
                 self._bus.close()
             if not self._stopping:
                 self._run_jobs(backoff.pause())
+        self._run_jobs(0)
+
+    def _run_between(self) -> None:
+        """Run waiting jobs within a long step."""
+        self._on_step(0.0)
         self._run_jobs(0)
 
     def _run_jobs(self, pause: float) -> None:

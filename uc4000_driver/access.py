@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 from typing import TypeVar
 
 from driver_common.errors import FrameError, NoAnswerError, RefusedError
 from driver_common.settings import UNKNOWN, Raw, Record
 from uc4000_driver.commands import Command, Uc4000Record
-from uc4000_driver.line import Line, TelegramRefusedError
+from uc4000_driver.line import Answer, DamagedRequestError, Line, TelegramRefusedError
 from uc4000_driver.sensor import Sensor
 
 T = TypeVar("T")
 
-ATTEMPTS = 2
+ATTEMPTS = 3
 
 
 class Access:
@@ -25,22 +26,17 @@ class Access:
 
     def execute(self, command: Command[T], attempts: int = ATTEMPTS) -> T:
         """Carry out a command; raises DriverError."""
-        return self.timed(command, attempts)[0]
+        return self.ask(command, attempts).value
 
-    def timed(self, command: Command[T], attempts: int = ATTEMPTS) -> tuple[T, int]:
+    def ask(self, command: Command[T], attempts: int = ATTEMPTS) -> Answer[T]:
         """Carry out a command, again where the transmission fails; see `Line.ask`."""
         for _ in range(attempts - 1):
-            try:
-                return self._ask(command)
-            except TelegramRefusedError as error:
-                if not error.is_transmission:
-                    raise
-            except (NoAnswerError, FrameError):
-                pass
-        return self._ask(command)
+            with contextlib.suppress(NoAnswerError, FrameError):
+                return self._ask_once(command)
+        return self._ask_once(command)
 
-    def _ask(self, command: Command[T]) -> tuple[T, int]:
-        """Ask once, and count what goes wrong."""
+    def _ask_once(self, command: Command[T]) -> Answer[T]:
+        """Ask, and count what goes wrong."""
         sensor = self._sensor
         try:
             return self._line.ask(sensor.address, command, str(sensor))
@@ -49,6 +45,9 @@ class Access:
             raise
         except NoAnswerError:
             sensor.statistics.timeouts += 1
+            raise
+        except DamagedRequestError:
+            sensor.statistics.damaged_requests += 1
             raise
         except FrameError as error:
             sensor.statistics.damaged += 1

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
 
 from driver_common import device_bus
 from driver_common.device_thread import Backoff
-from driver_common.errors import DriverError, LinkError, RefusedError, SettingError
+from driver_common.errors import FrameError, NoAnswerError, RefusedError, SettingError
 from driver_common.settings import suggestion
 from uc4000_driver import commands
 from uc4000_driver.access import Access
 from uc4000_driver.commands import Distance, Profile
-from uc4000_driver.line import Line, most_together
+from uc4000_driver.exchange import ADAPTER_LATENCY, REPLY_SPREAD, most_together, stagger
+from uc4000_driver.line import Answer, Line
 from uc4000_driver.sensor import Measurement, Sensor
+from uc4000_driver.telegram import GAP
 
+LATENCIES = (0.008, ADAPTER_LATENCY)  # s, see Group
+RECENT = 20  # sets by which a group is judged
+CALM = 500  # sets without a failure after which a group tries again whether it can be quicker
+NOTEWORTHY = 0.1  # share of failing sets
 OPERATING_TEMPERATURE = (-25, 70)  # °C, section 2.1
 
 
@@ -29,21 +35,79 @@ class Listener(device_bus.Listener[Sensor]):
         """Take a temperature; `stamp` is the host's time in ns when it was asked for."""
 
 
-@dataclass
 class Group:
     """Sensors that do not hear each other and may measure together.
 
+    With a late, damaged or missing reply all of a set have to measure again. So they do it only
+    where that is quicker than one after the other all the same.
+
     Attributes:
         names: Names of the sensors.
-        failures: Number of measurements together that had to be repeated one by one.
-        due: Monotonic time in s until which they measure one by one.
-        backoff: Pauses after failures.
+        sets: Number of measurements together.
+        failures: Number of those that had to be repeated one by one.
+        latency: Time in s by which adapter and host may hold up a reply; the more, the fewer
+            sensors can measure together.
     """
 
-    names: frozenset[str]
-    failures: int = 0
-    due: float = 0.0
-    backoff: Backoff = field(default_factory=lambda: Backoff(first=1.0, last=60.0))
+    def __init__(self, names: frozenset[str]) -> None:
+        """Begin with confidence."""
+        self.names = names
+        self.sets = 0
+        self.failures = 0
+        self.latency = LATENCIES[0]
+        self._recent: deque[bool] = deque([False] * RECENT, RECENT)  # whether the last sets failed
+        self._calm = 0  # sets since the last failure
+        self._paused_until = 0.0
+        self._backoff = Backoff(first=1.0, last=60.0)
+
+    @property
+    def failing(self) -> float:
+        """Share of the last sets that failed."""
+        return sum(self._recent) / RECENT
+
+    @property
+    def is_paused(self) -> bool:
+        """Whether the sensors measure one by one for a while."""
+        return time.monotonic() < self._paused_until
+
+    @property
+    def is_failing(self) -> bool:
+        """Whether it fails so often that a user should know."""
+        return self.is_paused or self.failing >= NOTEWORTHY
+
+    def note_success(self) -> None:
+        """Take note that a set was complete."""
+        self.sets += 1
+        self._recent.append(False)
+        self._calm += 1
+        if self._calm == CALM and self.latency != LATENCIES[0]:
+            self._try(LATENCIES[0])
+        elif self._calm > RECENT:
+            self._backoff.reset()
+
+    def note_failure(self, count: int, cycles: int) -> bool:
+        """Take note that a set of so many sensors failed; return whether there will be a pause."""
+        self.sets += 1
+        self.failures += 1
+        self._recent.append(True)
+        self._calm = 0
+        # One after the other takes n · t, together (n - 1) · stagger + t; a failure costs more.
+        alone = cycles * commands.CYCLE_TIME + REPLY_SPREAD
+        gain = (1 - 1 / count) * (1 - stagger(self.latency) / alone)
+        if self.failing < gain / 2:
+            return False
+        more = [latency for latency in LATENCIES
+                if latency > self.latency and most_together(cycles, latency) > 1]
+        if more:
+            self._try(more[0])
+            return False
+        self._paused_until = time.monotonic() + self._backoff.pause()
+        return True
+
+    def _try(self, latency: float) -> None:
+        self.latency = latency
+        self._recent.extend([False] * RECENT)
+        self._calm = 0
 
 
 def make_groups(texts: Iterable[str], names: Sequence[str]) -> list[Group]:
@@ -92,71 +156,82 @@ class Acquisition:
         """Measure with a sensor, and with those of its group that are due; raises DriverError."""
         if sensor.wants_temperature:
             self._read_temperature(sensor)
-        group = next((group for group in self.groups if sensor.options.name in group.names), None)
+        group = self.group_of(sensor)
         together = self._together_with(sensor, group) if group else []
         if group is None or len(together) < 2:
-            self._measure_alone(sensor)
+            self._measure_alone(sensor, group)
             return
         try:
-            self._measure_together(together)
-            group.backoff.reset()
-        except LinkError:
-            raise
-        except DriverError as error:
-            group.failures += 1
-            group.due = time.monotonic() + group.backoff.pause()
-            self._listener.on_note(sensor, f"cannot measure together with its group ({error}), "
-                                   "for a while alone")
-            self._measure_alone(sensor)
+            self._measure_together(together, group)
+        except (NoAnswerError, FrameError, RefusedError) as error:
+            for other in together:
+                other.is_punctual = False  # until it has shown alone that it was not the one
+            if group.note_failure(len(together), sensor.options.cycles):
+                self._listener.on_note(
+                    sensor, f"{group.failing:.0%} of the measurements together with its group "
+                            f"fail, for a while alone; the last time: {error}")
+            self._measure_alone(sensor, group)
+        else:
+            group.note_success()
+
+    def group_of(self, sensor: Sensor) -> Group | None:
+        """Return the group of a sensor, None where it measures alone."""
+        return next((group for group in self.groups if sensor.options.name in group.names), None)
 
     def _together_with(self, sensor: Sensor, group: Group) -> list[Sensor]:
         """Return the sensors that can measure together now."""
         now = time.monotonic()
-        if now < group.due or sensor.misses:
+        if group.is_paused or sensor.misses or not sensor.is_punctual:
             return [sensor]
         others = [other for other in self._sensors
                   if other is not sensor and other.options.name in group.names
                   and other.is_connected and not other.misses and not other.error
-                  and self._wants(other)
+                  and other.is_punctual and self._wants(other)
                   and other.due <= now and not other.wants_temperature
                   and other.options.cycles == sensor.options.cycles]
         others.sort(key=lambda other: other.served)
-        return [sensor, *others][:most_together(sensor.options.cycles)]
+        return [sensor, *others][:most_together(sensor.options.cycles, group.latency)]
 
-    def _measure_alone(self, sensor: Sensor) -> None:
+    def _measure_alone(self, sensor: Sensor, group: Group | None) -> None:
         sensor.plan_next()
         profile, cycles = sensor.profile, sensor.options.cycles
-        distance, sent = Access(self._line, sensor).timed(
-            commands.measure(profile, cycles), attempts=1)
-        self._report(sensor, distance, profile, sent)
+        answer = Access(self._line, sensor).ask(commands.measure(profile, cycles), attempts=1)
+        if group is not None:
+            sensor.is_punctual = answer.lateness <= stagger(LATENCIES[-1]) - GAP
+        self._report(sensor, answer, profile, cycles)
 
-    def _measure_together(self, sensors: Sequence[Sensor]) -> None:
+    def _measure_together(self, sensors: Sequence[Sensor], group: Group) -> None:
         profiles = [sensor.profile for sensor in sensors]
-        results = self._line.ask_together(
-            [(sensor.address, commands.measure(profile, sensor.options.cycles))
+        cycles = sensors[0].options.cycles
+        answers = self._line.ask_together(
+            [(sensor.address, commands.measure(profile, cycles))
              for sensor, profile in zip(sensors, profiles, strict=True)],
-            ", ".join(map(str, sensors)))
-        for sensor, profile, (distance, sent) in zip(  # those not asked have their turn next
-                sensors, profiles, results, strict=False):
+            ", ".join(map(str, sensors)), group.latency)
+        for sensor, profile, answer in zip(  # those not asked have their turn next
+                sensors, profiles, answers, strict=False):
             sensor.served = time.monotonic()
             sensor.plan_next()
-            self._report(sensor, distance, profile, sent)
+            self._report(sensor, answer, profile, cycles)
 
-    def _report(self, sensor: Sensor, distance: Distance, profile: Profile, sent: int) -> None:
-        sensor.count(distance.outcome)
-        half = round(sensor.options.cycles * commands.CYCLE_TIME / 2 * 1e9)
-        self._listener.on_measurement(sensor, Measurement(distance, profile, sent + half))
+    def _report(self, sensor: Sensor, answer: Answer[Distance], profile: Profile,
+                cycles: int) -> None:
+        if not self._wants(sensor):  # any more: it took its time
+            return
+        sensor.count(answer.value.outcome)
+        middle = answer.sent + round(cycles * commands.CYCLE_TIME / 2 * 1e9)
+        self._listener.on_measurement(sensor, Measurement(answer.value, profile, middle))
 
     def _read_temperature(self, sensor: Sensor) -> None:
         sensor.temperature_due = time.monotonic() + sensor.options.temperature_period
         try:
-            celsius, stamp = Access(self._line, sensor).timed(commands.READ_TEMPERATURE)
+            answer = Access(self._line, sensor).ask(commands.READ_TEMPERATURE, attempts=1)
         except RefusedError as error:  # the distance can be measured all the same
             self._listener.on_note(sensor, str(error), warning=True)
             return
+        celsius = answer.value
         low, high = OPERATING_TEMPERATURE
         if not low <= celsius <= high and celsius != sensor.temperature:
             self._listener.on_note(sensor, f"reports {celsius} °C, but is made for {low} … {high} "
                                    "°C: too hot, too cold or defective", warning=True)
         sensor.temperature = float(celsius)
-        self._listener.on_temperature(sensor, sensor.temperature, stamp)
+        self._listener.on_temperature(sensor, sensor.temperature, answer.sent)

@@ -94,28 +94,47 @@ class Connection:
 
     # --- addresses ---
 
-    def answers_at(self, address: int, attempts: int = ATTEMPTS) -> bool:
-        """Whether something answers at an address; raises LinkError."""
-        for _ in range(attempts):
+    def answers_at(self, address: int, silences: int = 1) -> bool:
+        """Whether a sensor answers at an address; what says another one comes from elsewhere.
+
+        Args:
+            address: The address.
+            silences: How often nothing has to come until nobody is there.
+
+        Raises:
+            FrameError: Only damaged answers came.
+            LinkError: The port failed.
+        """
+        for _ in range(ATTEMPTS):
+            damage = None
             try:
-                self._line.ask(address, commands.READ_ADDRESS, f"address {address}")
+                answer = self._line.ask(address, commands.READ_ADDRESS, f"address {address}")
+                if answer.value == address:
+                    return True
+            except RefusedError:
+                return True
             except NoAnswerError:
-                continue
-            except (FrameError, RefusedError):
-                pass
-            return True
+                silences -= 1
+                if not silences:
+                    return False
+            except FrameError as error:
+                damage = error
+        if damage is not None:
+            raise damage
         return False
 
     def _answering(self, addresses: Iterable[int]) -> list[int]:
-        return [address for address in addresses if self.answers_at(address, attempts=1)]
+        return list(filter(self.answers_at, addresses))
 
     def _ask_address(self) -> int:
         """Ask for the address by cast; one sensor on the wire may answer (section 5.1.6.3)."""
         try:
-            address = self._line.ask(CAST, commands.ASK_ADDRESS, "any sensor")[0]
+            address = self._line.ask(CAST, commands.ASK_ADDRESS, "any sensor").value
         except FrameError:
             found = self._answering(range(FIRST_ADDRESS, LAST_ADDRESS + 1))
-            if len(found) < 2:
+            if len(found) == 1:
+                return found[0]
+            if not found:
                 raise
         else:  # the wire carries a 1 only where all send one: others may hide behind the answer
             found = self._answering(other for other in range(address + 1, LAST_ADDRESS + 1)

@@ -1,15 +1,16 @@
-"""The wire seen from the master: time-outs, echo, and replies that come too late.
+"""The wire seen from the master: who may speak, echo, and replies that come too late.
 
 One request at a time; only `ask_together` has several sensors measure at the same time.
 """
 
 from __future__ import annotations
 
-import math
+import contextlib
 import threading
 import time
-from collections.abc import Sequence
-from typing import TypeVar
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 from driver_common.errors import (
     DriverError,
@@ -20,13 +21,11 @@ from driver_common.errors import (
     SettingError,
 )
 from driver_common.serial_link import SerialLink
-from uc4000_driver.commands import CYCLE_TIME, READ_SERIAL_NUMBER, READ_VERSION, Command, Distance
+from uc4000_driver.commands import READ_SERIAL_NUMBER, READ_VERSION, Command, Distance
+from uc4000_driver.exchange import NOISE_TIME, Exchange
 from uc4000_driver.telegram import (
     BAUD_RATE,
-    BYTE_TIME,
     CAST,
-    GAP,
-    REQUEST_LENGTH,
     SHORT_REPLY,
     ErrorCode,
     Reply,
@@ -36,25 +35,15 @@ from uc4000_driver.telegram import (
 
 T = TypeVar("T")
 
-REPLY_TIMEOUT = 0.050  # s until a reply that needs no measurement
-REPLY_SPREAD = 0.010  # s by which the reply to a measurement may be late (section 3.1.1)
-EEPROM_TIMEOUT = 0.500  # s more for a write; the manual gives no time
 LATENCY = 0.100  # s, allowance for USB adapters and the host
-BYTE_GAP = 0.100  # s that a reply which has begun may pause on its way through adapter and host
 QUIET = 0.200  # s of silence after which no late reply is expected any more
-NOISE_TIME = 2.0  # s to wait for such a silence
 SLICE = 0.1  # s after which a long wait looks whether it is to end
-
-REQUEST_TIME = REQUEST_LENGTH * BYTE_TIME
-# With several sensors measuring: the time from the end of a measurement in which its reply has to
-# arrive, and the time between two requests. So the replies come one after the other, in the order
-# of the requests, and one that is out of order is noticed.
-GROUP_LATENCY = 0.008  # s, allowance for adapters and the host; more would leave fewer sensors
-REPLY_WINDOW = REPLY_SPREAD + SHORT_REPLY * BYTE_TIME + GROUP_LATENCY
-STAGGER = REPLY_WINDOW + GAP
-SHORTEST = 0.4  # of a measurement's usual time; sound needs as much for 4 m and back
+PATIENCE = 0.4  # s for which others can wait as well
 
 ECHO_CHOICES = {"auto": None, "on": True, "off": False}
+TRANSMISSION_ERRORS = (ErrorCode.CHECKSUM_ERROR, ErrorCode.TELEGRAM_TIMEOUT,
+                       ErrorCode.TELEGRAM_UNDERFLOW, ErrorCode.TELEGRAM_OVERFLOW,
+                       ErrorCode.TRANSMISSION_ERROR)
 
 
 class TelegramRefusedError(RefusedError):
@@ -69,17 +58,28 @@ class TelegramRefusedError(RefusedError):
         super().__init__(f"{who} cannot {what}: {error_text(code)}")
         self.code = code
 
-    @property
-    def is_transmission(self) -> bool:
-        """Whether it was the transmission that failed; then the same can be asked again."""
-        return self.code in (ErrorCode.CHECKSUM_ERROR, ErrorCode.TELEGRAM_TIMEOUT,
-                             ErrorCode.TELEGRAM_UNDERFLOW, ErrorCode.TELEGRAM_OVERFLOW,
-                             ErrorCode.TRANSMISSION_ERROR)
+
+class DamagedRequestError(FrameError):
+    """A sensor answered that the request arrived damaged; the same can be asked again."""
 
 
-def most_together(cycles: int) -> int:
-    """Return how many sensors can be asked before the first one can reply."""
-    return 1 + math.floor((cycles * CYCLE_TIME - REQUEST_TIME - GAP) / STAGGER)
+class BusyError(DriverError):
+    """The line is in use, for longer than a user wants to wait."""
+
+
+@dataclass(frozen=True)
+class Answer(Generic[T]):
+    """The answer to a command.
+
+    Attributes:
+        value: What it says.
+        sent: The host's time in ns when the request had been sent.
+        lateness: Time in s from the end of the measurement to the reply, at most.
+    """
+
+    value: T
+    sent: int
+    lateness: float
 
 
 class Line:
@@ -90,6 +90,7 @@ class Line:
         local_echo: Whether the line returns what is sent, as the user says (errata U9).
         echo: Whether it does, as far as we heard; None while unknown.
         stray_bytes: Bytes that answered nothing.
+        on_wait: Called now and then in a long wait; what it does cannot have the line.
     """
 
     def __init__(self, port: str, local_echo: str = "auto") -> None:
@@ -98,9 +99,12 @@ class Line:
         self.local_echo = local_echo
         self.echo: bool | None = None
         self.stray_bytes = 0
+        self.on_wait: Callable[[], None] = lambda: None
         self._link: SerialLink | None = None
         self._late: set[int] = set()  # lengths of replies that may still come
         self._late_until = 0.0  # monotonic time until which a slow sensor may still reply
+        self._use = ""  # what it is in use for
+        self._use_until = 0.0  # monotonic time until which that may take
         self._interrupted = threading.Event()
 
     def open(self) -> None:
@@ -116,7 +120,7 @@ class Line:
             self._link = None
 
     def interrupt(self) -> None:
-        """Have a measurement of many cycles end soon; called from another thread."""
+        """Have every wait end with a LinkError from now on; called from another thread."""
         self._interrupted.set()
 
     @property
@@ -126,7 +130,28 @@ class Line:
             raise LinkError(f"{self.port} is not open")
         return self._link
 
-    def ask(self, address: int, command: Command[T], who: str) -> tuple[T, int]:
+    def write(self, data: bytes) -> None:
+        """Send bytes; raises LinkError."""
+        self.link.write(data)
+
+    def read(self, timeout: float, until: float) -> bytes:
+        """Return what arrives within `timeout` s, at most a slice of a long wait.
+
+        Args:
+            timeout: In s.
+            until: Monotonic time in s until which the whole wait may last.
+
+        Raises:
+            LinkError: The port failed, or the driver is to stop.
+        """
+        if self._interrupted.is_set():
+            raise LinkError("the driver is stopping")
+        self._use_until = until
+        if until - time.monotonic() > PATIENCE:
+            self.on_wait()
+        return self.link.read(min(SLICE, timeout))
+
+    def ask(self, address: int, command: Command[T], who: str) -> Answer[T]:
         """Carry out a command, once.
 
         Args:
@@ -134,49 +159,55 @@ class Line:
             command: What is asked.
             who: The sensor in words, for messages.
 
-        Returns:
-            The result, and the host's time in ns when the request had been sent.
-
         Raises:
             TelegramRefusedError: The sensor answered with an error code.
+            DamagedRequestError: The sensor could not read the request.
             FrameError: The reply was damaged.
             NoAnswerError: Nothing came in time.
+            BusyError: It was asked from within a long wait.
             SettingError: `local_echo` is wrong.
-            LinkError: The port failed.
+            LinkError: The port failed, or the driver is to stop.
         """
-        self._let_late_replies_pass(address, who)
-        (reply,), (sent,) = self._converse([command.request(address).encode()], command, who)
-        if not reply.acknowledged:
-            raise TelegramRefusedError(who, command.name, reply.data[0])
-        return command.decode(reply.data), sent
+        with self._in_use(f"{who}: {command.name}"):
+            self._let_late_replies_pass(address, who)
+            (answer,) = self._converse([(address, command)], who, LATENCY)
+            return answer
 
-    def ask_together(self, asked: Sequence[tuple[int, Command[Distance]]],
-                     who: str) -> list[tuple[Distance, int]]:
+    def ask_together(self, asked: Sequence[tuple[int, Command[Distance]]], who: str,
+                     latency: float) -> list[Answer[Distance]]:
         """Have several sensors measure at the same time.
 
         Replies do not say from whom they are, but they come in the order of the requests. So only
-        a full set of distances counts, each in its time. With one missing, damaged, late or a
-        refusal, which comes at once, it would be a guess whose they are.
+        a full set of distances counts. With one missing, damaged, late or a refusal, which comes at
+        once, it would be a guess whose they are.
 
         Args:
             asked: Addresses and what is asked there; all measure with the same number of cycles.
             who: The sensors in words, for messages.
+            latency: Time in s by which adapter and host may hold up a reply.
 
         Returns:
-            The distances, and the host's time in ns when each request had been sent. They are
-            fewer than asked for where sending took so long that a reply could begin.
+            The answers. They are fewer than asked for where sending took so long that a reply
+            could begin.
 
         Raises:
             DriverError: As `ask`; then none of the replies counts.
         """
-        address, command = asked[0]
-        self._let_late_replies_pass(address, who)
-        replies, times = self._converse(
-            [command.request(address).encode() for address, command in asked], command, who)
-        if not all(reply.acknowledged for reply in replies):
-            raise RefusedError(f"one of {who} refuses")
-        return [(command.decode(reply.data), sent)
-                for reply, sent in zip(replies, times, strict=True)]
+        with self._in_use(f"{who}: measure"):
+            self._let_late_replies_pass(asked[0][0], who)
+            return self._converse(asked, who, latency)
+
+    @contextlib.contextmanager
+    def _in_use(self, use: str) -> Iterator[None]:
+        if self._use:
+            seconds = max(0.0, self._use_until - time.monotonic())
+            raise BusyError(f"the line is in use for up to {seconds:.1f} s more ({self._use}); "
+                            "try again then, or set cycles to less")
+        self._use = use
+        try:
+            yield
+        finally:
+            self._use = ""
 
     def _let_late_replies_pass(self, address: int, who: str) -> None:
         """Make sure that no reply to an earlier request is taken for the next one's.
@@ -188,81 +219,56 @@ class Line:
         """
         if not self._late:
             return
-        self._discard_until(self._late_until)
+        while (remaining := self._late_until - time.monotonic()) > 0:
+            self.stray_bytes += len(self.read(remaining, self._late_until))
         barrier = next((command for command in (READ_VERSION, READ_SERIAL_NUMBER)
                         if command.reply_length not in self._late), None)
         if address == CAST or barrier is None:
             self._wait_for_silence()
         else:
-            (reply,), _ = self._converse([barrier.request(address).encode()], barrier, who)
-            if not reply.acknowledged:  # that, too, may be old
+            try:
+                self._converse([(address, barrier)], who, LATENCY)
+            except DamagedRequestError:
+                raise
+            except (FrameError, RefusedError) as error:  # what came may be old as well
                 self._late.add(barrier.reply_length)
-                raise NoAnswerError(f"{who} cannot {barrier.name}: {error_text(reply.data[0])}")
+                raise NoAnswerError(f"no answer from {who} but perhaps older ones: {error}"
+                                    ) from None
         self._late.clear()
-
-    def _discard_until(self, end: float) -> None:
-        while (remaining := end - time.monotonic()) > 0 and not self._interrupted.is_set():
-            self.stray_bytes += len(self.link.read(min(SLICE, remaining)))
 
     def _wait_for_silence(self) -> None:
         end = time.monotonic() + NOISE_TIME
-        while (data := self.link.read(QUIET)) and time.monotonic() < end:
-            self.stray_bytes += len(data)
+        quiet_at = time.monotonic() + QUIET
+        while (now := time.monotonic()) < min(quiet_at, end):
+            data = self.read(quiet_at - now, end)
+            if data:
+                self.stray_bytes += len(data)
+                quiet_at = time.monotonic() + QUIET
 
-    def _converse(self, requests: Sequence[bytes], command: Command[T],
-                  who: str) -> tuple[list[Reply], list[int]]:
-        """Send requests as far apart as their replies need it, and receive those."""
+    def _converse(self, asked: Sequence[tuple[int, Command[T]]], who: str,
+                  latency: float) -> list[Answer[T]]:
+        """Send requests and return the answers; raises DriverError as `ask`."""
         self.stray_bytes += len(self.link.read(0))
-        parser = ReplyParser(command.reply_length)
-        times: list[int] = []
-        ends: list[float] = []  # of the measurements, monotonic
-        next_time = time.monotonic()
-        last_time = next_time + command.duration - REQUEST_TIME - GAP
-        for request in requests:
-            self._receive_until(next_time, parser)
-            if times and time.monotonic() > last_time:
-                break
-            self.link.write(request)
-            times.append(time.time_ns() + round(REQUEST_TIME * 1e9))
-            ends.append(time.monotonic() + REQUEST_TIME + command.duration)
-            next_time = time.monotonic() + STAGGER
-            parser.sent(request)
-        timeout = command.duration + (REPLY_SPREAD if command.duration else REPLY_TIMEOUT)
-        timeout += EEPROM_TIMEOUT if command.is_write else 0.0
-        self._receive_all(time.monotonic() + REQUEST_TIME + timeout + LATENCY, parser)
+        command = asked[0][1]
+        exchange = Exchange(self, command, latency)
+        parser = exchange.parser
         try:
+            exchange.send([command.request(address).encode() for address, command in asked])
+            exchange.receive()
             self._check(parser, who)
-            self._check_times(parser, ends, command.duration, who)
-        except DriverError:
+            if len(exchange.sent) > 1 and parser.damaged:
+                raise FrameError(f"damaged replies from {who}: {parser.damaged.hex(' ').upper()}")
+            values = [_value(command, reply, who)
+                      for (_, command), reply in zip(asked, parser.replies, strict=False)]
+        except DamagedRequestError:  # so no other reply will come
+            raise
+        except (FrameError, NoAnswerError, SettingError) as error:
             self._late.add(command.reply_length)
-            self._late_until = time.monotonic() + command.duration
+            again = command.duration if isinstance(error, NoAnswerError) else 0.0
+            self._late_until = max(exchange.over, time.monotonic() + again)
             raise
         self.stray_bytes += parser.skipped
-        return parser.replies, times
-
-    def _receive_until(self, end: float, parser: ReplyParser) -> None:
-        """Take what arrives until a time."""
-        while (remaining := end - time.monotonic()) > 0:
-            parser.feed(self.link.read(remaining), time.monotonic())
-
-    def _receive_all(self, deadline: float, parser: ReplyParser) -> None:
-        """Take what arrives until all replies are there, or the time is over.
-
-        A reply that has begun may finish, as long as its bytes keep coming.
-        """
-        while not parser.complete and time.monotonic() < deadline + NOISE_TIME:
-            if self._interrupted.is_set():
-                raise LinkError("the driver is stopping")
-            remaining = max(0.0, deadline - time.monotonic())
-            data = self.link.read(BYTE_GAP if parser.pending else min(SLICE, remaining))
-            if data:
-                parser.feed(data, time.monotonic())
-            elif parser.pending:
-                parser.gap()
-            elif not remaining:
-                break
-        if parser.complete:
-            parser.feed(self.link.read(GAP))  # the silence that the next request needs anyway
+        return list(map(Answer, values, exchange.sent, exchange.lateness))
 
     def _check(self, parser: ReplyParser, who: str) -> None:
         """Raise what is wrong with the replies."""
@@ -283,19 +289,12 @@ class Line:
             hint = ", not even the echo of what was sent: is the line connected, or local_echo off?"
         raise NoAnswerError(f"no answer from {who} on {self.port}{hint}")
 
-    @staticmethod
-    def _check_times(parser: ReplyParser, ends: Sequence[float], duration: float,
-                     who: str) -> None:
-        """Raise where it is not certain which reply belongs to which request.
 
-        A distance takes its time: what looks like one before is noise, or an older one. Of several,
-        all have to come in the order of the requests.
-        """
-        if any(reply.acknowledged and arrived < end - duration * (1 - SHORTEST)
-               for reply, arrived, end in zip(parser.replies, parser.times, ends, strict=True)):
-            raise FrameError(f"a reply from {who} that came too early to be measured")
-        if len(ends) == 1:
-            return
-        if parser.damaged or any(arrived > end + REPLY_WINDOW
-                                 for arrived, end in zip(parser.times, ends, strict=True)):
-            raise FrameError(f"damaged or late replies from {who}")
+def _value(command: Command[T], reply: Reply, who: str) -> T:
+    """Return what a reply means; raises RefusedError or FrameError."""
+    if reply.acknowledged:
+        return command.decode(reply.data)
+    code = reply.data[0]
+    if code in TRANSMISSION_ERRORS:
+        raise DamagedRequestError(f"{who} received a damaged request: {error_text(code)}")
+    raise TelegramRefusedError(who, command.name, code)

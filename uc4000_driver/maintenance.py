@@ -59,7 +59,8 @@ class Maintenance:
         if address == sensor.address:
             raise SettingError(f"the sensor has address {address} already")
         if any(other is not sensor and other.options.address == address
-               for other in self._sensors) or self._connection.answers_at(address):
+               for other in self._sensors) or self._connection.answers_at(
+                    address, silences=2):
             raise SettingError(f"address {address} belongs to another sensor")
         with contextlib.suppress(NoAnswerError, FrameError):  # what counts is where it answers
             Access(self._line, sensor).execute(command)

@@ -195,14 +195,17 @@ class Uc4000Node(DeviceNode, Listener):
             "measurements": counts.outcomes.total(), **{
                 f"measurements: {outcome.value}": counts.outcomes[outcome] for outcome in Outcome},
             "time-outs": counts.timeouts, "checksum errors": counts.damaged,
+            "damaged requests": counts.damaged_requests,
             **{f"refusals: {error_text(code)}": count
                for code, count in sorted(counts.refusals.items())},
             "refusals": counts.refusals.total(), "connections": sensor.connections,
             "stray bytes": line.stray_bytes,
             "local echo": {None: "unknown", True: "on", False: "off"}[line.echo]}
-        for group in self.bus.acquisition.groups:
-            if sensor.options.name in group.names:
-                values["failed measurements of its group"] = group.failures
+        group = self.bus.acquisition.group_of(sensor)
+        if group is not None:
+            values |= {"measurements of its group": group.sets,
+                       "failed measurements of its group": group.failures,
+                       "failed lately [%]": 100 * group.failing}
         values |= sensor.differences
         hardware_id = f"{sensor.product} {identity.serial_number}" if identity else ""
         return diagnostics.to_status(self.status_name(sensor.options.name), hardware_id,
@@ -224,6 +227,11 @@ class Uc4000Node(DeviceNode, Listener):
                                       f"range {low} … {high} °C")
         if not self.bus.wants(sensor):
             return diagnostics.OK, "connected, acquisition stopped"
+        group = self.bus.acquisition.group_of(sensor)
+        if group is not None and group.is_failing:
+            alone = ", so they measure one by one" if group.is_paused else ""
+            return diagnostics.WARN, (f"{group.failing:.0%} of the measurements together with its "
+                                      f"group fail{alone}")
         message = f"{sensor.rate:.1f} measurements per second"
         if len(sensor.arrivals) > 2 and sensor.rate < 0.9 * sensor.options.rate:
             return diagnostics.WARN, f"{message} instead of {sensor.options.rate:g}"

@@ -50,6 +50,7 @@ class Statistics:
     refusals: Counter[int] = field(default_factory=Counter)  # by error code
     timeouts: int = 0
     damaged: int = 0
+    damaged_requests: int = 0
 
 
 @dataclass
@@ -80,6 +81,8 @@ class Sensor(Device):
         identity: Who it is; None while it is not connected.
         temperature: In °C; None while it was not read.
         acknowledged: What was written where nothing can be read, by the record's name.
+        damages: Number of damaged telegrams in a row.
+        is_punctual: Whether it answered in time when it last measured alone.
         temperature_due: Monotonic time in s at which to read the temperature.
     """
 
@@ -92,6 +95,8 @@ class Sensor(Device):
         self.identity: Identity | None = None
         self.temperature: float | None = None
         self.acknowledged: dict[str, Raw] = {}
+        self.damages = 0
+        self.is_punctual = False
         self.statistics = Statistics()
         self.arrivals: deque[float] = deque()
         self.temperature_due = 0.0
@@ -149,5 +154,7 @@ class Sensor(Device):
         self.identity = None
         self.temperature = None
         self.acknowledged.clear()
+        self.damages = 0
+        self.is_punctual = False
         self.arrivals.clear()
         self.address = self.options.address

@@ -6,7 +6,7 @@ All of `Uc4000Bus` runs in one thread (see `driver_common.device_thread`), but f
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 from driver_common.device_bus import DeviceBus
 from driver_common.errors import DriverError, FrameError, NoAnswerError, RefusedError, SettingError
@@ -18,6 +18,7 @@ from uc4000_driver.maintenance import Maintenance
 from uc4000_driver.sensor import Options, Sensor
 from uc4000_driver.telegram import CAST, FIRST_ADDRESS, LAST_ADDRESS
 
+DAMAGES_UNTIL_LOST = 10  # in a row; interference alone does not do that
 KEEP_ALIVE = 1.0  # s between requests to a sensor that is not measuring
 
 __all__ = ["Listener", "Uc4000Bus"]
@@ -80,6 +81,10 @@ class Uc4000Bus(DeviceBus[Sensor]):
         """Have the present step end soon; called from another thread."""
         self.line.interrupt()
 
+    def while_waiting(self, task: Callable[[], None]) -> None:
+        """Have a task done now and then in long waits; what it asks of the sensors is refused."""
+        self.line.on_wait = task
+
     def write(self, sensor: Sensor, changes: Mapping[str, Value]) -> dict[str, Value]:
         """Write settings for `DeviceNode`, see `Maintenance.write`."""
         return self.maintenance.write(sensor, changes)
@@ -105,17 +110,27 @@ class Uc4000Bus(DeviceBus[Sensor]):
             if self.wants(sensor):
                 self.acquisition.measure(sensor)
             else:
-                self._connection.check_address(sensor)
+                self._connection.check_address(sensor, attempts=1)
                 sensor.due = time.monotonic() + KEEP_ALIVE
+            sensor.damages = 0
             self._note_well(sensor)
         except RefusedError as error:
             self._note_refusal(sensor, error)
-        except (NoAnswerError, FrameError) as error:
+        except NoAnswerError as error:
             self._note_miss(sensor, error)
+        except FrameError as error:
+            self._note_damage(sensor, error)
 
     def _start_or_stop(self, sensor: Sensor) -> None:
         """Begin or end to count the rate; a sensor measures only when asked."""
         sensor.arrivals.clear()
+
+    def _note_damage(self, sensor: Sensor, error: FrameError) -> None:
+        """Ask a sensor again that is there, but whose telegrams are damaged."""
+        sensor.damages += 1
+        if sensor.damages >= DAMAGES_UNTIL_LOST:
+            raise error
+        sensor.due = 0.0
 
     def _note_refusal(self, sensor: Sensor, error: RefusedError) -> None:
         """Ask a sensor that refuses ever more rarely."""

@@ -41,6 +41,9 @@ class FakeBus:
 class InterruptibleBus(FakeBus):
     """A bus whose present step can be ended."""
 
+    def while_waiting(self, task):
+        self.between = task
+
     def interrupt(self):
         self.steps.put(LinkError("interrupted"))
 

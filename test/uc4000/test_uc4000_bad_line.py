@@ -1,0 +1,381 @@
+"""What a session makes of a bad line: echo, strangers, damage, refusals, late replies."""
+
+from __future__ import annotations
+
+import math
+import random
+import time
+
+import pytest
+import serial
+from uc4000_master import Master, Requests, counts, named, still
+
+from driver_common.errors import (
+    NoAnswerError,
+    RefusedError,
+    WrongDeviceError,
+)
+from driver_common.simulator.line import SimulatedLine
+from uc4000_driver.commands import OpCode
+from uc4000_driver.line import TRANSMISSION_ERRORS
+from uc4000_driver.sensor import Options
+from uc4000_driver.telegram import ErrorCode, Reply, Request
+
+# --- the line's echo ---------------------------------------------------------------------------
+
+@pytest.mark.parametrize(("setting", "echo"), [
+    ("auto", True), ("auto", False), ("on", True), ("off", False)])
+def test_the_echo_is_stripped(connect, setting, echo):
+    line, _ = connect()
+    line.faults.echo = echo
+    master = connect.master(line, local_echo=setting)
+    assert master.distances(3)[-1] == still(0)
+    assert master.bus.line.echo == echo
+
+
+@pytest.mark.parametrize(("setting", "echo", "text"), [
+    ("on", False, "local_echo is on, but the line does not return what is sent; "
+                  "set local_echo to off or auto"),
+    ("off", True, "local_echo is off, but the line returns what is sent; "
+                  "set local_echo to on or auto")])
+def test_a_wrong_echo_setting_is_named(connect, setting, echo, text):
+    line, _ = connect(1)
+    line.faults.echo = echo
+    master = connect.master(line, Options(address=1), local_echo=setting)
+    assert str(master.lose()) == text
+    master.bus.line.local_echo = "auto"
+    assert master.distances()[0] == still(0)
+
+
+def test_the_echo_may_change_while_it_is_measuring(one):
+    line, _, master = one
+    master.measure()
+    for echo in (True, False):
+        line.faults.echo = echo
+        assert set(master.distances(3)) == {still(0)}
+        assert master.bus.line.echo == echo
+
+
+# --- nobody, or somebody else ------------------------------------------------------------------
+
+@pytest.mark.parametrize(("echo", "text"), [
+    (False, "no answer from any sensor on {port}; check power, wiring and the address"),
+    (True, "no answer from any sensor on {port}; the line returns what is sent, so it is right up "
+           "to there: check the sensor's power and wiring, and the address")])
+def test_no_sensor(connect, echo, text):
+    line, (simulated,) = connect()
+    line.faults.echo = echo
+    simulated.silent = True
+    master = connect.master(line, Options())
+    assert str(master.lose()) == text.format(port=line.port)
+    simulated.silent = False
+    assert master.distances() == [still(0)]
+
+
+def test_no_line_while_its_echo_is_expected(connect):
+    line, (simulated,) = connect()
+    simulated.silent = True
+    master = connect.master(line, local_echo="on")
+    assert "not even the echo of what was sent" in str(master.lose())
+
+
+def test_a_sensor_at_another_address(connect):
+    line, _ = connect(5)
+    master = connect.master(line, Options(address=2))
+    assert str(master.lose()) == (
+        f"no answer from address 2 on {line.port}, but a sensor answers at address 5; "
+        "correct the parameter address")
+
+
+@pytest.mark.parametrize("addresses", [(3, 5), (1, 3), (2, 7), (5, 7), (2, 3, 6)], ids=str)
+def test_several_sensors_where_one_is_expected(connect, addresses):
+    line, _ = connect(*addresses)  # the answers of some pairs together look like that of one
+    error = connect.master(line, Options()).lose()
+    assert isinstance(error, WrongDeviceError)
+    assert str(error) == (
+        f"several sensors answer ({', '.join(map(str, addresses))}); say which one with the "
+        "parameter address, or name all of them with the parameter sensors")
+
+
+def test_what_looks_like_a_reply_before_anything_was_measured_shifts_nothing(connect):
+    line, _ = connect(1, 2)
+    master = connect.master(line, *named(1, 2)).find()
+    receive = line._device.receive
+
+    def receive_with_noise(data, now):
+        line._device.receive = receive
+        return [(now + 0.010, bytes.fromhex("23 D1")), *receive(data, now)]  # a distance
+
+    master.measure(4)
+    line._device.receive = receive_with_noise
+    start = len(master.heard.measurements)
+    master.measure(6)
+    for name, measurement in master.heard.measurements[start:]:
+        assert measurement.distance.value == still(int(name[1:]) - 1)
+    assert sum(sensor.statistics.damaged for sensor in master.bus.devices) == 1
+
+
+def test_another_device(connect):
+    line, (simulated,) = connect()
+    simulated.version = b"iSYS-4001 000001\0\0"
+    error = connect.master(line).lose()
+    assert isinstance(error, WrongDeviceError)
+    assert "its version is 'iSYS-4001 000001', which is not that of a UC4000" in str(error)
+
+
+class Chatterbox:
+    """A device that says the same to everything."""
+
+    baud_rate = 19200
+
+    def receive(self, data, now):
+        return [(now, b"\x02OK\r\n")]
+
+
+def test_a_device_with_another_protocol():
+    line = SimulatedLine(Chatterbox()).start()
+    master = Master(line.port, Options(address=7))
+    try:
+        error = master.lose()
+        assert "damaged reply from address 7: 02 4F 4B 0D 0A" in str(error)
+    finally:
+        master.bus.close()
+        line.close()
+
+
+def test_two_sensors_with_one_address(connect):
+    line, _ = connect(4, 4, 5)
+    master = connect.master(line, *named(4, 5))
+    error = master.lose()
+    assert "damaged reply from s4 (address 4)" in str(error)
+    assert "two sensors have address 4" in str(error)
+    assert set(master.distances(3, "s5")) == {still(2)}
+
+
+def test_two_replies_to_one_request(connect):
+    line, (simulated, _) = connect(4, 4)
+    simulated.silent = True
+    master = connect.master(line, Options(address=4)).find()
+    simulated.silent = False
+    error = master.lose()
+    assert "two sensors have address 4" in str(error)
+
+# --- damage, refusals, silence -----------------------------------------------------------------
+
+def test_damaged_replies_are_counted_and_never_believed(one):
+    line, _, master = one
+    line.faults.echo = True
+    master.find()
+    line.faults.corrupt = 0.2
+    master.until(lambda: master.sensor.statistics.damaged >= 2
+                 and len(master.heard.measurements) >= 4)
+    assert {measurement.distance.value for _, measurement in master.heard.measurements} == {
+        still(0)}
+
+
+def test_noise_and_pauses_cost_time_but_no_truth(one):
+    line, _, master = one
+    master.find()
+    line.faults.noise = 0.2
+    line.faults.split = 0.01
+    assert set(master.distances(10)) == {still(0)}
+
+
+def test_refused_measurements_are_counted_by_their_codes(one):
+    _, simulated, master = one
+    codes = [code for code in (*range(0x01, 0x0E), 0x42, 0xFF) if code not in TRANSMISSION_ERRORS]
+    for code in codes:
+        simulated.refuse[OpCode.PROFILE_B] = code
+        master.until(lambda code=code: master.sensor.statistics.refusals[code])
+        assert f"(0x{code:02X})" in str(master.sensor.error)
+        assert master.heard.notes[-1] == f"{master.sensor.error}; it is asked again"
+        assert master.sensor.identity is not None
+        simulated.refuse.clear()
+        master.sensor.due = 0.0  # not to wait
+        assert master.distances() == [still(0)]
+        assert master.sensor.error is None
+        assert master.heard.notes[-1] == "is well again"
+    assert master.sensor.statistics.refusals.total() == len(codes) == 10
+
+
+def test_one_that_goes_on_refusing_is_mentioned_once(one):
+    _, simulated, master = one
+    simulated.refuse[OpCode.PROFILE_B] = ErrorCode.SESSION_ERROR
+    master.until(lambda: master.sensor.statistics.refusals[ErrorCode.SESSION_ERROR] >= 3)
+    assert master.heard.notes == [
+        "address 7 cannot measure: session error (0x06); it is asked again"]
+
+
+@pytest.mark.parametrize("code", TRANSMISSION_ERRORS)
+def test_a_request_that_arrived_damaged_is_sent_again(one, code):
+    _, simulated, master = one
+    master.find()
+    simulated.refuse[OpCode.GAIN] = code
+
+    def only_once(request, answer):
+        simulated.refuse.clear()
+        return answer
+
+    Requests(simulated, only_once)
+    assert master.write({"gain_db": 60.0}) == {"gain_db": 60.0}
+    assert master.sensor.statistics.damaged_requests == 1
+    assert master.sensor.statistics.refusals.total() == 0
+
+
+@pytest.mark.parametrize("code", TRANSMISSION_ERRORS)
+def test_a_measurement_whose_request_arrived_damaged_is_no_refusal(one, code):
+    _, simulated, master = one
+    master.measure()
+    times = iter([True] * 4)
+
+    def damage(request, answer):
+        damaged = answer[0], Reply(bytes([code]), acknowledged=False)
+        return damaged if next(times, False) else answer
+
+    Requests(simulated, damage)
+    assert master.distances(2) == [still(0)] * 2
+    assert master.sensor.statistics.damaged_requests == 4
+    assert master.sensor.statistics.refusals.total() == 0
+    assert (master.heard.notes, master.heard.lost) == ([], [])
+
+
+def test_damage_without_end_is_named(one):
+    _, simulated, master = one
+    master.find()
+    simulated.refuse = dict.fromkeys(OpCode, ErrorCode.CHECKSUM_ERROR)
+    assert str(master.lose()) == "address 7 received a damaged request: checksum error (0x01)"
+
+
+def test_other_refusals_are_not_asked_again(one):
+    _, simulated, master = one
+    master.find()
+    asked = Requests(simulated)
+    simulated.refuse[OpCode.GAIN] = ErrorCode.SESSION_ERROR
+    with pytest.raises(RefusedError, match="address 7 cannot read the amplifier gain: session"):
+        master.write({"gain_db": 60.0})
+    assert len(asked.all) == 1
+
+
+@pytest.mark.parametrize("refuses", [False, True])
+def test_one_that_is_silent_or_refuses_does_not_slow_the_others(connect, refuses):
+    line, sensors = connect(1, 2, 3)
+    master = connect.master(line, *named(1, 2, 3)).find()
+    if refuses:
+        sensors[0].refuse[OpCode.PROFILE_B] = ErrorCode.SESSION_ERROR
+    else:
+        sensors[0].silent = True
+    master.until(lambda: master.bus.devices[0].error is not None)
+    asked, before = Requests(sensors[0]), counts(master)
+    begin = time.monotonic()
+    master.measure(10)
+    took = time.monotonic() - begin
+    after = counts(master)
+    assert after["s1"] == before["s1"]
+    assert abs(after["s2"] - before["s2"] - 5) <= 1
+    assert len(asked.all) <= 2 + 2 * math.log2(1 + took / 0.1)  # the pauses double
+    sensors[0].silent = False
+    sensors[0].refuse.clear()
+    assert set(master.distances(2, "s1")) == {still(0)}
+    assert set(master.distances(2, "s2")) == {still(1)}
+
+
+def test_a_lost_sensor_returns_configured_as_before(connect):
+    line, (simulated,) = connect()
+    wanted = {"temperature_compensation": "off"}
+    master = connect.master(line, Options(address=7, wanted=wanted)).find()
+    master.write({"gain_db": 60.0})
+    simulated.silent = True
+    assert "no answer from address 7" in str(master.lose())
+    with pytest.raises(NoAnswerError, match="is not connected: no answer from"):
+        master.write({"gain_db": 61.0})
+    simulated.power_cycle()
+    simulated.restore_factory_settings()
+    simulated.silent = False
+    master.find()
+    assert simulated.value("gain_db") == 60.0
+    assert simulated.value("temperature_compensation") == "off"
+    assert master.sensor.connections == 2
+
+
+def test_a_short_loss_of_power_is_noticed_by_one_missing_reply(connect):
+    line, (simulated,) = connect()
+    wanted = {"gain_db": 60.0, "temperature_compensation": "off"}
+    master = connect.master(line, Options(address=7, wanted=wanted))
+    master.measure()
+    simulated.restore_factory_settings()
+    simulated.power_cycle()
+    master.until(lambda: simulated.value("gain_db") == 60.0
+                 and simulated.value("temperature_compensation") == "off")
+    master.measure()
+    assert master.sensor.values["gain_db"] == 60.0
+
+
+def test_a_missing_reply_alone_writes_nothing(connect):
+    line, (simulated,) = connect()
+    wanted = {"gain_db": 60.0, "temperature_compensation": "off"}
+    master = connect.master(line, Options(address=7, wanted=wanted))
+    master.measure()
+    asked = Requests(simulated)
+    simulated.power_cycle()
+    master.until(lambda: master.sensor.statistics.timeouts >= 1)
+    master.measure()
+    assert asked.writes() == []
+
+
+# --- replies that come too late ----------------------------------------------------------------
+
+def test_a_late_reply_never_passes_for_that_of_another_request(connect):
+    line, _ = connect(1, 2, 3)
+    master = connect.master(line, *named(1, 2, 3, temperature_period=0.3)).find()
+    chance = random.Random(4)
+    for _ in range(3):
+        line.faults.echo = not line.faults.echo
+        line.faults.delay = chance.uniform(0.05, 0.4)
+        late = sum(sensor.statistics.timeouts for sensor in master.bus.devices)
+        master.until(lambda late=late: sum(
+            sensor.statistics.timeouts for sensor in master.bus.devices) > late
+            or line.faults.delay < 0.1)
+        line.faults.delay = 0.0
+        for number in (1, 2, 3):
+            master.measure(1, f"s{number}")
+    assert len(master.heard.measurements) >= 9
+    for name, measurement in master.heard.measurements:
+        assert measurement.distance.value == still(int(name[1]) - 1)
+    assert {celsius for _, celsius, _ in master.heard.temperatures} == {21.0}
+    assert all(sensor.address == int(sensor.options.name[1]) for sensor in master.bus.devices)
+
+
+def test_a_line_that_is_always_too_slow_gives_nothing_rather_than_something_wrong(one):
+    line, _, master = one
+    master.find()
+    line.faults.delay = 0.25
+    assert isinstance(master.lose(), NoAnswerError)
+    assert master.heard.measurements == []
+    line.faults.delay = 0.0
+    assert set(master.distances(3)) == {still(0)}
+
+
+def test_a_sensor_that_takes_too_long_is_not_heard_as_another_one(connect):
+    line, sensors = connect(1, 2)
+    master = connect.master(line, *named(1, 2)).find()
+    chance = random.Random(6)
+
+    def dawdle(request, answer):
+        sensors[0].evaluation = chance.choice((0.005, chance.uniform(0.050, 0.150)))
+        return answer
+
+    Requests(sensors[0], dawdle)
+    master.until(lambda: master.bus.devices[0].statistics.timeouts >= 2)
+    assert len(master.heard.measurements) > 2
+    for name, measurement in master.heard.measurements:
+        assert measurement.distance.value == still(int(name[1]) - 1)
+
+
+def test_a_reply_to_another_program_is_not_taken_for_ours(connect):
+    line, _ = connect()
+    port = serial.Serial(line.port, 19200)
+    port.write(Request(7, OpCode.PROFILE_B, 0xFE).encode())
+    port.close()
+    master = connect.master(line, Options(address=7))
+    assert master.distances()[0] == still(0)
+    assert master.sensor.address == 7
