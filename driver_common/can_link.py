@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import errno
 import logging
 import os
 import re
@@ -12,6 +11,7 @@ from collections.abc import Sequence
 
 import can
 
+from driver_common.advice import CAN_ERRORS, NO_ACKNOWLEDGE
 from driver_common.errors import LinkError, SettingError
 from driver_common.settings import suggestion
 
@@ -20,18 +20,6 @@ GREETING = b"< hi >"  # of a socketcand server
 NUMBER = re.compile("-?[0-9]+")
 SEND_TIMEOUT = 0.5  # s
 RECEIVE_BUFFER = 4 * 1024 * 1024  # bytes; some seconds of the fastest stream
-_ADVICE = {
-    errno.ENODEV: "there is no such channel; 'ip -brief link show type can' lists them",
-    errno.ENETDOWN: "it is down; 'sudo ip link set {channel} up type can bitrate {bitrate}' "
-                    "brings it up",
-    errno.EAFNOSUPPORT: "this kernel has no CAN; 'sudo modprobe can_raw' loads it",
-    errno.EPERM: "no permission; bring the channel up as root, then a user may open it",
-    errno.ECONNREFUSED: "nothing listens there; check host and port in can_options",
-    errno.ECONNRESET: "the server closed the connection",
-    errno.EPIPE: "the server closed the connection",
-    errno.ENOBUFS: "the transmit buffer is full: nobody acknowledges; check wiring, termination "
-                   "and bit rate",
-}
 
 
 class CanLink:
@@ -144,15 +132,16 @@ class CanLink:
     def _reason(self, error: BaseException) -> str:
         cause: BaseException | None = error
         while cause is not None:
-            if isinstance(cause, OSError) and cause.errno in _ADVICE:
-                return _ADVICE[cause.errno].format(channel=self.channel, bitrate=self._bitrate)
+            if isinstance(cause, OSError) and cause.errno in CAN_ERRORS:
+                return CAN_ERRORS[cause.errno].text(channel=self.channel, bitrate=self._bitrate,
+                                                    where=" in can_options")
             cause = cause.__cause__ or cause.__context__
         if self.interface not in can.VALID_INTERFACES:
             known = sorted(can.VALID_INTERFACES)
             return (f"python-can has no such interface{suggestion(self.interface, known)} "
                     f"(it has {', '.join(known)})")
         if "buffer full" in str(error):
-            return _ADVICE[errno.ENOBUFS]
+            return NO_ACKNOWLEDGE.text()
         if isinstance(error, TimeoutError):
             return "no answer; check host and port in can_options"
         if isinstance(error, socket.gaierror):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import errno
 import fcntl
 import math
 import os
@@ -16,7 +15,9 @@ from typing import Any
 import serial
 from serial.tools import list_ports
 
+from driver_common.advice import SERIAL_ERRORS
 from driver_common.errors import LinkError
+from driver_common.port_use import group_of, holders_text
 
 BITS_PER_BYTE = 10  # 8N1
 WRITE_TIMEOUT = 1.0  # s
@@ -26,20 +27,6 @@ NETWORK = ("socket", "rfc2217")  # URLs of ports elsewhere
 SCHEMES = (*NETWORK, "hwgrep")
 SILENCE = 10.0  # s without an answer over a network: its other end may be gone unnoticed
 SLICE = 0.01  # s of a wait where the port cannot change its time-out
-_ADVICE = {
-    errno.ENOENT: "there is no such port{ports}; is it plugged in?",
-    errno.EACCES: "no permission; add yourself to the group dialout with "
-                  "'sudo usermod -aG dialout $USER' and log in again",
-    errno.EWOULDBLOCK: "it is in use by another program; close that one first "
-                       "('fuser -v {port}' names it)",
-    errno.EBUSY: "it is in use by another program; close that one first "
-                 "('fuser -v {port}' names it)",
-    errno.EIO: "it is gone; is it plugged in?",
-    errno.ENXIO: "it is gone; is it plugged in?",
-    errno.ECONNREFUSED: "nothing listens there; check host and port",
-    errno.EISDIR: "that is no serial port{ports}",
-    errno.ENOTTY: "that is no serial port{ports}",
-}
 
 
 class SerialLink:
@@ -187,8 +174,9 @@ def _reason(port: str, error: Exception) -> str:
     number = next((cause.args[0] for cause in causes
                    if isinstance(cause, (OSError, termios.error))
                    and cause.args and isinstance(cause.args[0], int)), None)
-    if number in _ADVICE:
-        return _ADVICE[number].format(port=port, ports=_other_ports())
+    if number in SERIAL_ERRORS:
+        return SERIAL_ERRORS[number].text(ports=_other_ports(), group=group_of(port),
+                                          holder=holders_text(port), where="")
     if "disconnected" in str(error) or "returned no data" in str(error):
         return "it was unplugged or closed by the other side"
     if number is not None:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
+from driver_common import advice
 from driver_common.device import Note
 from driver_common.errors import (
     DriverError,
@@ -107,9 +108,7 @@ class Connection:
         frames = self._line.broadcast(commands.READ_ADDRESS.request(BROADCAST))
         addresses = sorted({frame.source for frame in frames})
         if len(addresses) > 1:
-            raise WrongDeviceError(
-                f"several sensors answer ({', '.join(map(str, addresses))}); say which one with "
-                "the parameter address, or name all of them with the parameter sensors")
+            raise WrongDeviceError(advice.SEVERAL.text(addresses=", ".join(map(str, addresses))))
         if not addresses:
             raise NoAnswerError(f"no sensor answers on {self._line.port} at "
                                 f"{self._line.link.baud_rate} Bd")
@@ -152,17 +151,16 @@ class Connection:
                 frames = self._line.broadcast(commands.READ_ADDRESS.request(BROADCAST))
                 if frames and baud_rate in self.baud_candidates(radar) and (
                         radar.options.address in (BROADCAST, frames[0].source)):
-                    return ("; it answers only some requests: check the wiring (termination, "
-                            "length, ground)")
+                    return f"; {advice.POOR_LINE.text()}"
                 if frames:
-                    return (f", but a sensor answers at address {frames[0].source} and "
-                            f"{baud_rate} Bd; correct the parameters address and serial_baud")
+                    return ", but " + advice.ANOTHER_ADDRESS.text(
+                        address=frames[0].source, rate=f" and {baud_rate} Bd",
+                        parameters="s address and serial_baud")
         finally:
             link.baud_rate = configured
         if parser.damaged_frames + parser.dropped_bytes > damaged:
-            return ("; bytes arrive that are no iSYS frames: several sensors answer at once (give "
-                    "the parameter address), or something else talks on this line")
-        return "; check power, wiring (RS-485: A and B swapped?) and the address"
+            return f"; {advice.GARBAGE.text(family='iSYS')}"
+        return f"; {advice.SILENCE_RS485.text()}"
 
     # --- configure ---
 

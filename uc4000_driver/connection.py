@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from functools import partial
 
+from driver_common import advice
 from driver_common.device_bus import Listener
 from driver_common.errors import (
     DriverError,
@@ -143,21 +144,18 @@ class Connection:
                 return address
             found = [*self._answering([address]), *found]
         raise WrongDeviceError(
-            f"several sensors answer ({', '.join(map(str, found))}); say which one with the "
-            "parameter address, or name all of them with the parameter sensors") from None
+            advice.SEVERAL.text(addresses=", ".join(map(str, found)))) from None
 
     def explained(self, sensor: Sensor, error: DriverError) -> DriverError:
         """Add to "no answer" what could be found out about the reason."""
         if not isinstance(error, NoAnswerError):
             return error
-        hint = "; check power, wiring and the address"
-        if self._line.echo:
-            hint = ("; the line returns what is sent, so it is right up to there: check the "
-                    "sensor's power and wiring, and the address")
+        silence = advice.SILENCE_BEHIND_ECHO if self._line.echo else advice.SILENCE
+        hint = f"; {silence.text()}"
         if self._alone and sensor.options.address != CAST:
             try:
-                hint = (f", but a sensor answers at address {self._ask_address()}; correct the "
-                        "parameter address")
+                hint = ", but " + advice.ANOTHER_ADDRESS.text(
+                    address=self._ask_address(), rate="", parameters=" address")
             except WrongDeviceError as several:
                 hint = f", but {several}"
             except (NoAnswerError, FrameError, RefusedError):

@@ -17,6 +17,7 @@ import pytest
 from bus_master import needs_errors_of_socketcand
 
 from driver_common import can_link
+from driver_common.advice import CAN_ERRORS
 from driver_common.can_link import CanLink, parse_options
 from driver_common.errors import LinkError, SettingError
 from driver_common.simulator.bus import CanFrame, SimulatedBus
@@ -286,7 +287,7 @@ def operation_error(number):
 
 
 def test_every_advice_is_tested():
-    assert can_link._ADVICE.keys() == ADVICE.keys()
+    assert CAN_ERRORS.keys() == ADVICE.keys()
 
 
 @pytest.mark.parametrize("number", ADVICE, ids=errno.errorcode.get)

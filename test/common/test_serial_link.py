@@ -133,7 +133,7 @@ def test_the_time_of_bytes_on_the_line(link):
 
 def test_a_port_is_opened_for_one_program_alone(terminal, link):
     error = error_of(terminal.path)
-    assert f"cannot open {terminal.path}: it is in use by another program" in error
+    assert f"cannot open {terminal.path}: it is in use by another program" in error  # this one
     assert f"fuser -v {terminal.path}" in error
     link.close()
     SerialLink(terminal.path, 115200).close()

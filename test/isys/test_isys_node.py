@@ -393,7 +393,7 @@ def test_a_port_that_another_program_uses_is_taken_when_it_is_free(station, laun
     second = launch({"serial_port": here.line.port, "serial_baud": FAST_LINE},
                     "-r", "__node:=second")
     line = second.wait_for_line("cannot open")
-    assert f"cannot open {here.line.port}: it is in use by another program" in line
+    assert f"cannot open {here.line.port}: it is in use by python" in line
     here.process.stop()
     second.wait_for_line("connected to iSYS-4001")
     second.stop()
