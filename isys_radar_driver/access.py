@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -10,7 +11,7 @@ from driver_common.settings import Raw, Record, RecordAccess
 from isys_radar_driver import commands
 from isys_radar_driver.commands import Command, IsysRecord, Location
 from isys_radar_driver.frames import Frame
-from isys_radar_driver.line import REPLY_TIMEOUT, Line
+from isys_radar_driver.line import DAMAGED_ATTEMPTS, REPLY_TIMEOUT, Line
 from isys_radar_driver.radar import Radar
 
 T = TypeVar("T")
@@ -72,14 +73,25 @@ class Access:
         return _Records(self, radar, location)
 
     def exchange(self, radar: Radar, request: Frame, decode: Callable[[Frame], T], timeout: float,
-                 sources: tuple[int, ...] = (), attempts: int = ATTEMPTS) -> tuple[T, int]:
+                 sources: tuple[int, ...] = (), attempts: int = ATTEMPTS,
+                 damaged_attempts: int = DAMAGED_ATTEMPTS) -> tuple[T, int]:
         """Exchange a request with a radar, see `Line.exchange`."""
         try:
-            return self.line.exchange(request, decode, timeout, sources=sources,
-                                      attempts=attempts)
+            reply = self.line.exchange(request, decode, timeout, sources=sources,
+                                       attempts=attempts, damaged_attempts=damaged_attempts)
         except RefusedError:
+            radar.answered = time.monotonic()
             radar.statistics.refusals += 1
             raise
+        radar.answered = time.monotonic()
+        return reply
+
+    def optional(self, radar: Radar, command: Command[T]) -> T | None:
+        """Return the result of a command, or None where the radar refuses it or stays silent."""
+        try:
+            return self.timed(radar, command, attempts=1)[0]
+        except (RefusedError, NoAnswerError, FrameError):
+            return None
 
     def answers_at(self, radar: Radar, address: int) -> bool:
         """Whether a device answers at an address."""

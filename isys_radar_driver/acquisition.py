@@ -8,17 +8,20 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from driver_common.errors import RefusedError
+from driver_common.errors import FrameError, RefusedError
 from driver_common.settings import Value
 from isys_radar_driver import commands
 from isys_radar_driver.access import Access
+from isys_radar_driver.frames import READ_TARGET_LIST, Frame
 from isys_radar_driver.line import LATENCY
+from isys_radar_driver.plausibility import MEMORY_CYCLES
 from isys_radar_driver.radar import Radar
 from isys_radar_driver.targets import Resolution, TargetList, decode_target_list
 
 if TYPE_CHECKING:
     from isys_radar_driver.session import Listener
 
+DOUBT_TIME = 30.0  # s after damage in which a list must also go on from the ones before it
 REALIGN_PERIOD = 30.0  # s between restarts of a radar that is out of its turn
 
 
@@ -113,7 +116,10 @@ class Acquisition:
         timeout = (max(model.timeout, 1.1 * radar.cycle_time) + LATENCY
                    + self._access.line.link.seconds(radar.list_size(Resolution.BITS_32)))
         targets, stamp = self._read_target_list(radar, resolution, timeout)
-        begin = time.monotonic() - (time.time_ns() - stamp) * 1e-9
+        begin = _monotonic(stamp)
+        if self._objection(radar, targets, begin):
+            radar.statistics.implausible_lists += 1
+            return
         missed = radar.count_list(begin, clipping=targets.clipping, shared=len(self._radars) > 1)
         listener.on_target_list(radar, targets, stamp)
         if options.read_range_list and model.supports(commands.READ_RANGE_LIST):
@@ -128,18 +134,40 @@ class Acquisition:
     def _read_target_list(self, radar: Radar, resolution: Resolution,
                           timeout: float) -> tuple[TargetList, int]:
         range_step, output = radar.known_model.range_step_16, radar.options.output
-        parser = self._access.line.parser
-        parser.fixed_targets = radar.fixed_targets if resolution.fixed_length else None
+        line = self._access.line
+        line.parser.fixed_targets = radar.fixed_targets if resolution.fixed_length else None
+
+        def decode(frame: Frame) -> TargetList:
+            return decode_target_list(frame, range_step, resolution.bits)
+
         try:
             targets, stamp = self._access.exchange(
-                radar, commands.read_target_list(radar.address, output, resolution),
-                lambda frame: decode_target_list(frame, range_step), timeout, attempts=1)
+                radar, commands.read_target_list(radar.address, output, resolution), decode,
+                timeout, attempts=1, damaged_attempts=1)
         except RefusedError as error:
             raise RefusedError(
                 f"no target list of output {output} in {resolution.bits} bit, change output or "
                 f"target_list_resolution: {error}") from None
-        radar.fixed_targets = parser.fixed_targets or 0
+        except FrameError:
+            damaged = line.parser.damaged_frame
+            with contextlib.suppress(FrameError):
+                if damaged is not None and damaged.function_code == READ_TARGET_LIST:
+                    begin = _monotonic(line.reply_began)
+                    radar.continuity.follow(decode(damaged), begin,
+                                            begin - MEMORY_CYCLES * radar.cycle_time, whole=False)
+            raise
+        radar.fixed_targets = line.parser.fixed_targets or 0
         return targets, stamp
+
+    def _objection(self, radar: Radar, targets: TargetList, begin: float) -> str:
+        """Return why a list that began at a monotonic time in s cannot be true, or ""."""
+        line = self._access.line
+        objection = radar.limits.objection(targets)
+        if objection:
+            line.damaged = time.monotonic()
+        jump = radar.continuity.follow(targets, begin, begin - MEMORY_CYCLES * radar.cycle_time)
+        in_doubt = time.monotonic() - line.damaged < DOUBT_TIME
+        return objection or (jump if in_doubt else "")
 
     def resolution(self, radar: Radar) -> Resolution:
         """Return the resolution of the target lists; raises SettingError."""
@@ -186,3 +214,8 @@ class Acquisition:
         waiting = sum(other.cycle_time for other in self._radars
                       if other.sends_lists and other is not radar)
         return 1 / (radar.cycle_time + waiting)
+
+
+def _monotonic(stamp: int) -> float:
+    """Return the monotonic time in s of a host's time in ns."""
+    return time.monotonic() - (time.time_ns() - stamp) * 1e-9

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import time
 from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 from driver_common import advice
 from driver_common.device import Note
@@ -18,9 +17,9 @@ from driver_common.errors import (
     WrongDeviceError,
 )
 from isys_radar_driver import commands
-from isys_radar_driver.access import Access
+from isys_radar_driver.access import ATTEMPTS, Access
 from isys_radar_driver.acquisition import Acquisition
-from isys_radar_driver.commands import Command, Location
+from isys_radar_driver.commands import Location
 from isys_radar_driver.frames import BROADCAST
 from isys_radar_driver.models import BAUD_RATES, model_of_product
 from isys_radar_driver.radar import Identity, Radar
@@ -29,8 +28,7 @@ from isys_radar_driver.settings import record_of, settings_of
 if TYPE_CHECKING:
     from isys_radar_driver.session import Listener
 
-T = TypeVar("T")
-
+BOARD_TEMPERATURES = {"dsp": commands.READ_DSP_TEMPERATURE, "rfe": commands.READ_RFE_TEMPERATURE}
 KEEP_ALIVE = 1.0  # s between requests to a radar that is not measuring
 CHECK_PERIOD = 5.0  # s between checks for a reset while it measures
 CHECK_TIME = 0.020  # s that a check may take beside its bytes, with a slow adapter
@@ -62,14 +60,16 @@ class Connection:
     # --- find ---
 
     def baud_candidates(self, radar: Radar) -> tuple[int, ...]:
-        """Return the baud rates at which a radar may answer."""
+        """Return the baud rates at which a radar may answer, the likeliest first."""
         if self._baud_rate:
             return (self._baud_rate,)
         if self._line.is_open and any(other.is_connected for other in self._radars):
             return (self._line.link.baud_rate,)
         if radar.options.model is not None:
             return (radar.options.model.baud_rate,)
-        return BAUD_RATES[:1] if self._guesses_baud_rate else BAUD_RATES
+        if self._guesses_baud_rate:
+            return (radar.baud_rate or BAUD_RATES[0],)
+        return tuple(dict.fromkeys((radar.baud_rate or BAUD_RATES[0], *BAUD_RATES)))
 
     @property
     def _guesses_baud_rate(self) -> bool:
@@ -78,20 +78,17 @@ class Connection:
                 and not any(radar.is_connected for radar in self._radars))
 
     def find(self, radar: Radar) -> None:
-        """Find the radar at one of the possible baud rates, identify and configure it."""
-        link = self._line.link
-        failure: DriverError = NoAnswerError("no answer")
-        for baud_rate in self.baud_candidates(radar):
-            link.baud_rate = baud_rate
-            try:
-                if radar.options.address == BROADCAST:
-                    radar.address = self._ask_address()
-                identity = self._identify(radar)
-                break
-            except (NoAnswerError, FrameError) as error:
-                failure = error
-        else:
-            raise failure
+        """Find the radar at one of the possible baud rates, identify and configure it.
+
+        One that was lost measures on first, with its settings looked at behind that.
+        """
+        identity = self._search(radar)
+        if identity is radar.known:
+            radar.identity = identity
+            radar.unchecked = [*radar.settings]
+            radar.misses = 1  # so that a setting is looked at before its first list
+            self._acquisition.start_or_stop(radar)
+            return
         expected = radar.options.model
         if expected is not None and identity.model.name != expected.name:
             raise WrongDeviceError(f"expected an {expected.name}, but an {identity.model.name} "
@@ -99,9 +96,24 @@ class Connection:
                                    "change the parameter model")
         identity.model.resolutions_of(radar.options.resolution)
         if self._guesses_baud_rate:
-            link.baud_rate = identity.model.baud_rate
+            self._line.link.baud_rate = identity.model.baud_rate
         radar.identity = identity
+        radar.baud_rate = self._line.link.baud_rate
         self._configure(radar)
+
+    def _search(self, radar: Radar) -> Identity:
+        """Return who answers; raises DriverError where nobody does."""
+        failure: DriverError = NoAnswerError("no answer")
+        for baud_rate in self.baud_candidates(radar):
+            self._line.link.baud_rate = baud_rate
+            try:
+                if radar.address == BROADCAST:
+                    radar.address = self._ask_address()
+                return self._identify(radar)
+            except (NoAnswerError, FrameError) as error:
+                failure = error
+                radar.address = radar.options.address  # it may have another one by now
+        raise failure
 
     def _ask_address(self) -> int:
         """Ask for the address by broadcast; one sensor on the line may answer (3.3.4.1)."""
@@ -116,20 +128,16 @@ class Connection:
 
     def _identify(self, radar: Radar) -> Identity:
         access = self._access
-        device_name, _ = access.timed(radar, commands.READ_DEVICE_NAME, attempts=1)
+        attempts = 1 if radar.known is None else ATTEMPTS
+        device_name, _ = access.timed(radar, commands.READ_DEVICE_NAME, attempts=attempts)
+        if radar.known is not None and device_name == radar.known.device_name:
+            return radar.known
         model = model_of_product(access.execute(radar, commands.READ_PRODUCT_INFORMATION))
         firmware = access.execute(radar, commands.READ_FIRMWARE_VERSION)
         return Identity(model.with_firmware(firmware.number), device_name, firmware, *(
-            self._if_supported(radar, command) for command in (
+            access.optional(radar, command) for command in (
                 commands.READ_DSP_HARDWARE_VERSION, commands.READ_RFE_HARDWARE_VERSION,
                 commands.READ_BOOTLOADER_VERSION)))
-
-    def _if_supported(self, radar: Radar, command: Command[T]) -> T | None:
-        """Return the result, or None where older firmware refuses (section 3.3.6.5)."""
-        try:
-            return self._access.execute(radar, command)
-        except RefusedError:
-            return None
 
     def explained(self, radar: Radar, error: DriverError) -> DriverError:
         """Add to "no answer" what could be found out about the reason."""
@@ -169,6 +177,8 @@ class Connection:
 
         Where that fails the radar is not connected, as nobody knows what it holds.
         """
+        identity, radar.known = radar.identity, None
+        radar.unchecked.clear()
         try:
             radar.measuring = None  # it may have been left running
             self._acquisition.stop(radar)
@@ -179,6 +189,7 @@ class Connection:
         except DriverError:
             radar.identity = None
             raise
+        radar.known = identity
 
     def configure_again(self, radar: Radar, reason: str) -> None:
         """React to a radar that seems to have been reset without notice; raises DriverError."""
@@ -199,35 +210,44 @@ class Connection:
     def keep_alive(self, radar: Radar) -> None:
         """Check that a radar without target lists is there and as it was; read temperatures."""
         radar.due = time.monotonic() + KEEP_ALIVE
-        self._access.execute(radar, commands.READ_ADDRESS)
+        self._access.execute(radar, commands.READ_DEVICE_NAME)
         self.check_reset(radar)
         if not radar.known_model.supports(commands.READ_DSP_TEMPERATURE):
             return
-        temperatures = {"dsp": commands.READ_DSP_TEMPERATURE, "rfe": commands.READ_RFE_TEMPERATURE}
         stamp = 0
-        for name, command in temperatures.items():
-            with contextlib.suppress(RefusedError):  # this one lacks it
-                radar.temperatures[name], stamp = self._access.timed(radar, command)
-        self._listener.on_temperatures(radar, stamp)
+        for name, command in BOARD_TEMPERATURES.items():
+            if name not in radar.absent:
+                try:
+                    radar.temperatures[name], stamp = self._access.timed(radar, command, attempts=1)
+                except (RefusedError, NoAnswerError):  # this one lacks it
+                    radar.absent.add(name)
+        if stamp:
+            self._listener.on_temperatures(radar, stamp)
 
     def is_check_due(self, radar: Radar) -> bool:
         """Whether to look for a reset: after a silence, and now and then if it costs no cycle."""
-        if radar.misses or radar.refused:
+        if radar.misses or radar.refused or radar.unchecked:
             return True
         return time.monotonic() > radar.check_due and self._acquisition.has_time_for(
             radar, self._line.link.seconds(CHECK_SIZE) + CHECK_TIME)
 
     def check_reset(self, radar: Radar) -> None:
         """Configure a radar again that lost a setting which is not in its EEPROM."""
-        names = sorted(radar.unsaved or radar.options.wanted.keys() & radar.settings.keys())
-        if not names:
+        name = self._next_to_check(radar)
+        if not name:
             return
-        radar.checks += 1
         radar.check_due = time.monotonic() + CHECK_PERIOD
-        name = names[radar.checks % len(names)]
         setting = radar.settings[name]
-        raws = self._access.read_record(radar, record_of(setting), Location.RAM, attempts=1)
+        raws = self._access.read_record(radar, record_of(setting), Location.RAM)
         reported = setting.decode(raws[setting.field])
         if reported != radar.values[name]:
             self.configure_again(radar, f"{name} is {setting.text(reported)}, it was "
                                         f"{setting.text(radar.values[name])}")
+
+    def _next_to_check(self, radar: Radar) -> str:
+        """Return the next setting to look at, "" where there is none; what can be lost is first."""
+        names = sorted(radar.unsaved or radar.options.wanted.keys() & radar.settings.keys())
+        radar.checks += bool(names)
+        if names and (radar.misses or not radar.unchecked):
+            return names[radar.checks % len(names)]
+        return radar.unchecked.pop() if radar.unchecked else ""

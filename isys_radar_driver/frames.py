@@ -96,15 +96,19 @@ class FrameParser:
     Attributes:
         fixed_targets: Number of targets of a fixed-length target list; None: the length follows
             from the list's own count; 0: not known yet, learned from the next list (errata I8).
+        raw_signals: Whether raw signals may come, whose frames are by far the longest.
         dropped_bytes: Bytes that belonged to no frame.
         damaged_frames: Frames whose checksum or end delimiter was wrong.
+        damaged_frame: The longest one of them, as it came, since this was set to None.
     """
 
     def __init__(self, fixed_targets: int | None = None) -> None:
         """Start with an empty buffer."""
         self.fixed_targets = fixed_targets
+        self.raw_signals = True
         self.dropped_bytes = 0
         self.damaged_frames = 0
+        self.damaged_frame: Frame | None = None
         self._buffer = bytearray()
 
     @property
@@ -165,7 +169,7 @@ class FrameParser:
     def _length_by_content(self) -> tuple[Frame | None, int]:
         """Find the end of a frame with SD3, which carries no length (errata I8)."""
         function_code = self._byte(3)
-        if function_code == READ_RAW_SIGNALS:
+        if function_code == READ_RAW_SIGNALS and self.raw_signals:
             signals, blocks, size = self._byte(4), self._byte(5), self._byte(6)
             if not 1 <= signals <= _MAX_RAW_SIGNALS or blocks == 0 or size not in (2, 4):
                 return None, 0
@@ -215,9 +219,12 @@ class FrameParser:
         """Return the frame whose body is `start` to `end`, if checksum and end delimiter fit."""
         if len(self._buffer) < end + 2:
             raise _NeedMoreError
-        if not self._fits(start, end):
-            self.damaged_frames += 1
-            return None, 0
         destination, source, function_code = self._buffer[start:start + 3]
         pdu = bytes(self._buffer[start + 3:end])
-        return Frame(destination, source, function_code, pdu, delimiter), end + 2
+        frame = Frame(destination, source, function_code, pdu, delimiter)
+        if self._fits(start, end):
+            return frame, end + 2
+        self.damaged_frames += 1
+        if self.damaged_frame is None or len(pdu) > len(self.damaged_frame.pdu):
+            self.damaged_frame = frame
+        return None, 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
+import math
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -11,15 +11,20 @@ from typing import TypeVar
 from driver_common.errors import FrameError, LinkError, NoAnswerError, RefusedError
 from driver_common.serial_link import SerialLink
 from isys_radar_driver.commands import READ_DEVICE_NAME
-from isys_radar_driver.frames import FAILURE, MASTER, Frame, FrameParser
+from isys_radar_driver.frames import FAILURE, MASTER, READ_RAW_SIGNALS, Frame, FrameParser
 
 T = TypeVar("T")
 
 REPLY_TIMEOUT = 0.100  # s until the first byte of a reply that needs no measurement
 LATENCY = 0.050  # s, allowance for USB adapters and the host
-BYTE_GAP = 0.100  # s that a reply which has begun may pause
+BYTE_GAP = 0.050  # s that a reply which has begun may pause
 BROADCAST_WINDOW = 0.060  # s in which further sensors may answer a broadcast
+GRACE = 0.5  # s in which pauses may add up until a reply is over in any case
+DAMAGED_ATTEMPTS = 5  # how often to ask a device that answers, but damaged
 OVERHEAD = 9  # bytes of an SD2 frame beside its PDU
+SMALLEST_FRAME = 6  # bytes; what is damaged and shorter is no reply but a glitch
+LONGEST_REPLY = 500  # bytes, of a target list
+LONGEST_RAW_REPLY = 131_100  # bytes, of eight signals of 255 blocks
 
 
 class Line:
@@ -29,6 +34,8 @@ class Line:
         port: Device path or pyserial URL.
         parser: Finds the frames; counts what is damaged.
         stale_frames: Good frames that answered nothing.
+        reply_began: Host's time in ns at which the last reply began, whole or damaged.
+        damaged: Monotonic time in s at which something arrived damaged.
     """
 
     def __init__(self, port: str) -> None:
@@ -36,8 +43,10 @@ class Line:
         self.port = port
         self.parser = FrameParser()
         self.stale_frames = 0
+        self.reply_began = 0
+        self.damaged = -math.inf
         self._link: SerialLink | None = None
-        self._unanswered: set[int] = set()  # addresses whose late replies may still come
+        self._unanswered: dict[int, Frame] = {}  # requests whose late replies may still come
         self._names_due: Counter[int] = Counter()  # how many of those are device names
 
     def open(self, baud_rate: int) -> None:
@@ -68,7 +77,8 @@ class Line:
         return self._link
 
     def exchange(self, request: Frame, decode: Callable[[Frame], T], timeout: float, *,
-                 sources: tuple[int, ...] = (), attempts: int = 2) -> tuple[T, int]:
+                 sources: tuple[int, ...] = (), attempts: int = 2,
+                 damaged_attempts: int = DAMAGED_ATTEMPTS) -> tuple[T, int]:
         """Send a request, again where its reply is lost, and return the decoded reply.
 
         Args:
@@ -76,21 +86,30 @@ class Line:
             decode: Turns the reply into a value; raises FrameError where it does not fit.
             timeout: Time in s until the reply begins.
             sources: Addresses that may answer, if others than the one that was asked.
-            attempts: How often to ask.
+            attempts: How often to ask where nothing comes.
+            damaged_attempts: How often to ask where what comes is damaged.
 
         Returns:
             What `decode` made of the reply, and the host's time in ns when the reply began.
 
         Raises:
             RefusedError: The device answered with a failure.
-            FrameError: Only replies came that `decode` does not accept.
+            FrameError: What came was damaged, or `decode` did not accept it.
             NoAnswerError: Nothing came in time.
             LinkError: The port failed.
         """
-        for _ in range(attempts - 1):
-            with contextlib.suppress(NoAnswerError, FrameError):
+        while True:
+            try:
                 return self._attempt(request, decode, timeout, sources)
-        return self._attempt(request, decode, timeout, sources)
+            except NoAnswerError:
+                attempts -= 1
+                if attempts <= 0:
+                    raise
+            except FrameError:
+                self.damaged = time.monotonic()
+                damaged_attempts -= 1
+                if damaged_attempts <= 0:
+                    raise
 
     def broadcast(self, request: Frame) -> list[Frame]:
         """Send a request to all and return what they answer."""
@@ -112,22 +131,23 @@ class Line:
         """Send a request once.
 
         Replies carry the function code alone, not what was asked for: after a time-out a late
-        reply could pass for the answer to the next request. So that one is preceded by a request
+        reply could pass for the answer to another request. So that one is preceded by a request
         for the device name, whose reply cannot be mistaken, and all before it is discarded. Where
         several device names are due, only the last one is the proof.
         """
         address = request.destination
         asks_name = request.function_code == READ_DEVICE_NAME.function_code
-        if address in self._unanswered and not asks_name:
+        if self._unanswered.get(address, request) != request and not asks_name:
             self._attempt(READ_DEVICE_NAME.request(address), lambda frame: None,
                           REPLY_TIMEOUT + timeout, ())
         self._discard_input()
         self._names_due[address] += asks_name
+        dropped = self.parser.dropped_bytes
+        self.parser.damaged_frame = None
         self.link.write(request.encode())
         unacceptable: FrameError | None = None
         older_name: tuple[Frame, int] | None = None
-        sent = self.link.seconds(len(request.pdu) + OVERHEAD)
-        for frame, stamp in self._frames(timeout + sent):
+        for frame, stamp in self._frames(request, timeout):
             if frame == request:
                 continue  # the line's echo of ourselves
             self._note_name(frame)
@@ -137,7 +157,8 @@ class Line:
             if asks_name and self._names_due[address]:
                 older_name = frame, stamp
                 continue
-            self._unanswered.discard(address)
+            if asks_name:  # else an earlier one of the same kind may have been answered
+                self._unanswered.pop(address, None)
             if frame.function_code == FAILURE:
                 raise RefusedError(f"address {frame.source} answers with failure (0xFD): not "
                                    "possible in its present state, or a value that it does "
@@ -148,31 +169,41 @@ class Line:
                 unacceptable = error
         if older_name is not None:  # the others were lost
             self._names_due[address] = 0
-            self._unanswered.discard(address)
+            self._unanswered.pop(address, None)
             return decode(older_name[0]), older_name[1]
-        self._unanswered.add(address)
+        if unacceptable is None and self.parser.dropped_bytes - dropped >= SMALLEST_FRAME:
+            self._names_due[address] -= asks_name and self._names_due[address] > 0
+            raise FrameError(f"the reply of address {address} arrived damaged")
+        self._unanswered[address] = request
         raise unacceptable or NoAnswerError(f"address {address} does not answer on {self.port} "
                                             f"at {self.link.baud_rate} Bd")
 
-    def _frames(self, timeout: float) -> Iterator[tuple[Frame, int]]:
+    def _frames(self, request: Frame, timeout: float) -> Iterator[tuple[Frame, int]]:
         """Yield the frames that arrive in time, each with the host time in ns at its first byte.
 
-        A reply that has begun may finish, as long as its bytes keep coming.
+        A reply that has begun may finish as long as its bytes keep coming; silence ends it, whole
+        or damaged. No line is listened to for longer than the longest reply takes.
         """
-        link = self.link
-        deadline = time.monotonic() + timeout
-        stamp = 0
-        while data := link.read(deadline - time.monotonic()):
-            if not self.parser.pending:
-                stamp = time.time_ns() - round(link.seconds(len(data)) * 1e9)
-            for frame in self.parser.feed(data):
-                yield frame, stamp
-            if self.parser.pending:
-                deadline = max(deadline, time.monotonic() + BYTE_GAP)
-            elif time.monotonic() >= deadline:
+        link, parser = self.link, self.parser
+        parser.raw_signals = request.function_code == READ_RAW_SIGNALS
+        longest = LONGEST_RAW_REPLY if parser.raw_signals else LONGEST_REPLY
+        deadline = time.monotonic() + timeout + link.seconds(len(request.pdu) + OVERHEAD)
+        end = deadline + link.seconds(longest) + GRACE
+        dropped, self.reply_began = parser.dropped_bytes, 0
+        while data := link.read(min(deadline, end) - time.monotonic()):
+            if not parser.pending:
+                self.reply_began = time.time_ns() - round(link.seconds(len(data)) * 1e9)
+            for frame in parser.feed(data):
+                yield frame, self.reply_began
+            now = time.monotonic()
+            if parser.pending + parser.dropped_bytes - dropped >= SMALLEST_FRAME:
+                deadline = now + BYTE_GAP
+            elif parser.pending:
+                deadline = max(deadline, now + BYTE_GAP)
+            if now >= min(deadline, end):
                 break
-        for frame in self.parser.flush():
-            yield frame, stamp
+        for frame in parser.flush():
+            yield frame, self.reply_began
 
     def _discard_input(self) -> None:
         """Drop what arrived unasked, so that it cannot pass for a reply."""

@@ -88,7 +88,8 @@ class Maintenance:
         self._require(radar)
         try:
             return self._acquisition.write(radar, changes)
-        except (NoAnswerError, FrameError) as error:  # so what it holds now is not known
+        except (NoAnswerError, FrameError) as error:
+            radar.known = None  # nobody knows what it holds now
             self._lose(radar, error)
             raise
 

@@ -43,9 +43,10 @@ class Model:
         max_targets: Most targets in a list for each measurement mode (sections 3.3.4.4, 3.3.7).
         frequency_channels: Number of frequency channels (table 11).
         first_firmware_with_all_channels: Older firmware has four channels (table 11).
-        range_max: Largest range limit in m (table 14).
+        range_max: Largest range limit in m (table 14); 0 = it measures no range.
         signal_max: Largest signal limit in dB (table 14).
-        velocity_max: Largest velocity limit in m/s (table 14).
+        velocity_max: Largest velocity limit in m/s (table 14); 0 = it measures no velocity.
+        measures_angle: Whether the angles of its targets are measured, not a placeholder.
         raw_as_float: Whether raw signals are float32 (section 4.3, iSYS-6004).
     """
 
@@ -64,6 +65,7 @@ class Model:
     range_max: float = 0.0
     signal_max: float = 250.0
     velocity_max: float = 0.0
+    measures_angle: bool = False
     raw_as_float: bool = False
 
     @property
@@ -146,10 +148,12 @@ def _model_6xxx(name: str, sections: str = _600X, *, range_max: float = 20.0,
 
 
 MODELS: Mapping[str, Model] = MappingProxyType({model.name: model for model in (
-    _model_4xxx("iSYS-4001", _400X, 0.075, 0.100, range_max=150.0, velocity_max=70.0),
-    _model_4xxx("iSYS-4002", _400X, 0.075, 0.100, range_max=150.0, velocity_max=70.0),
+    _model_4xxx("iSYS-4001", _400X, 0.075, 0.100, range_max=150.0, velocity_max=70.0,
+                measures_angle=True),
+    _model_4xxx("iSYS-4002", _400X, 0.075, 0.100, range_max=150.0, velocity_max=70.0,
+                measures_angle=True),
     _model_4xxx("iSYS-4003", _400X, 0.300, 0.330, range_max=50.0, velocity_max=12.5,
-                baud_rate=9600),
+                measures_angle=True, baud_rate=9600),
     _model_4xxx("iSYS-4004", _4XXX + _LINE_FILTER + _RANGE, 0.075, 0.100, range_max=35.0,
                 range_step_16=0.001, frequency_channels=3, first_firmware_with_all_channels=0.0),
     _model_4xxx("iSYS-4013", _4XXX + _LINE_FILTER + _VELOCITY, 0.750, 0.825, velocity_max=12.5,

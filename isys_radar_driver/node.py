@@ -307,7 +307,8 @@ class IsysRadarNode(DeviceNode, Listener):
         values |= {
             "target lists": counts.target_lists, "lost cycles": counts.lost_cycles,
             "cycles left to others": counts.shared_cycles,
-            "clippings": counts.clippings, "time-outs": counts.timeouts,
+            "clippings": counts.clippings, "implausible lists": counts.implausible_lists,
+            "damaged replies": counts.damaged_replies, "time-outs": counts.timeouts,
             "refusals": counts.refusals, "connections": radar.connections,
             "damaged frames": line.parser.damaged_frames,
             "dropped bytes": line.parser.dropped_bytes,

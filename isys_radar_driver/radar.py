@@ -16,6 +16,7 @@ from isys_radar_driver.commands import Version
 from isys_radar_driver.frames import BROADCAST
 from isys_radar_driver.line import OVERHEAD
 from isys_radar_driver.models import FAST, Model
+from isys_radar_driver.plausibility import Continuity, Limits
 from isys_radar_driver.settings import record_of
 from isys_radar_driver.targets import TARGET_SIZES, Resolution
 
@@ -53,6 +54,8 @@ class Statistics:
         lost_cycles: Cycles of which none came.
         shared_cycles: Cycles that ended while the line served another radar.
         clippings: Lists without targets, because the receiver was overloaded.
+        implausible_lists: Lists with a good checksum that cannot be true; dropped.
+        damaged_replies: Answers that arrived damaged.
         timeouts: Answers that did not come in time.
         refusals: Answers with a failure.
     """
@@ -61,6 +64,8 @@ class Statistics:
     lost_cycles: int = 0
     shared_cycles: int = 0
     clippings: int = 0
+    implausible_lists: int = 0
+    damaged_replies: int = 0
     timeouts: int = 0
     refusals: int = 0
 
@@ -93,10 +98,16 @@ class Radar(Device):
         options: How it is to be used.
         address: Its address, 0 while unknown.
         identity: Who it is; None while it is not connected.
+        known: Who it was when its settings were last read; None = they are to be read again.
+        baud_rate: At which it was found, in Bd; 0 = never.
+        unchecked: Settings of a radar that came back, which may have changed meanwhile.
+        absent: Names of optional readings that it does not have.
+        answered: Monotonic time in s of its last good answer.
         temperatures: Board temperatures in °C, by name.
         measuring: Whether acquisition was started; None while that is not known.
         cycle_end: Monotonic time in s at which one of its cycles ended, as far as known.
         aligned: Monotonic time in s of its last start.
+        continuity: How its target lists go on from each other.
         arrivals: Monotonic times in s at which target lists began, the last few seconds.
         clippings: Those of them that told of an overloaded receiver.
         fixed_targets: Learned length of fixed-length lists, 0 while unknown.
@@ -114,11 +125,17 @@ class Radar(Device):
         super().__init__(options)
         self.address = options.address
         self.identity: Identity | None = None
+        self.known: Identity | None = None
+        self.baud_rate = 0
+        self.unchecked: list[str] = []
+        self.absent: set[str] = set()
+        self.answered = 0.0
         self.temperatures: dict[str, float] = {}
         self.measuring: bool | None = False
         self.statistics = Statistics()
         self.cycle_end = 0.0
         self.aligned = 0.0
+        self.continuity = Continuity()
         self.arrivals: deque[float] = deque()
         self.clippings: deque[float] = deque()
         self.fixed_targets = 0
@@ -142,8 +159,8 @@ class Radar(Device):
         self.measuring = False
         self.fixed_targets = 0
         self.refused = 0
+        self.absent.clear()
         self.forget_lists()
-        self.address = self.options.address
 
     def forget_lists(self) -> None:
         """Count rate and lost cycles from the next target list on."""
@@ -213,6 +230,14 @@ class Radar(Device):
     def is_overloaded(self) -> bool:
         """Whether most of the last target lists told of an overloaded receiver."""
         return 2 * len(self.clippings) > len(self.arrivals)
+
+    @property
+    def limits(self) -> Limits:
+        """What its target lists keep to."""
+        offset = self.values.get("mounting_offset", 0.0)
+        assert isinstance(offset, float)
+        return Limits.of(self.known_model, self.options.output, self.max_targets, self.cycle_time,
+                         offset)
 
     def list_size(self, resolution: Resolution) -> int:
         """Return the bytes of the longest target list in the present measurement mode."""

@@ -24,6 +24,8 @@ from isys_radar_driver.maintenance import Maintenance
 from isys_radar_driver.radar import Options, Radar
 from isys_radar_driver.targets import TargetList
 
+DAMAGED_TIME = 5.0  # s without a good answer after which what arrives is not the radar's
+
 
 class Listener(device_bus.Listener[Radar]):
     """What a user of the bus wants to hear; all called in the thread of the bus."""
@@ -132,9 +134,19 @@ class RadarBus(DeviceBus[Radar]):
                 raise
             if isinstance(error, RefusedError):
                 self._note_refusal(radar, error)
+            elif isinstance(error, FrameError):
+                self._note_damage(radar, error)
             else:
                 radar.statistics.timeouts += 1
                 self._note_miss(radar, error)
+
+    def _note_damage(self, radar: Radar, error: FrameError) -> None:
+        """Ask a radar again whose answer arrived damaged: it is there, as long as some are good."""
+        radar.statistics.damaged_replies += 1
+        if time.monotonic() < radar.answered + DAMAGED_TIME:
+            radar.misses = 0
+        else:
+            self._note_miss(radar, error)
 
     def _note_refusal(self, radar: Radar, error: RefusedError) -> None:
         """Configure a radar again that refuses; if it refuses then, ask it ever more rarely."""

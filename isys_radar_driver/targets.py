@@ -81,15 +81,16 @@ def _format(bits: int, range_step_16: float) -> _Format:
     return form if bits == 32 else _Format(form.struct, form.steps._replace(range=range_step_16))
 
 
-def decode_target_list(frame: Frame, range_step_16: float = 0.01) -> TargetList:
+def decode_target_list(frame: Frame, range_step_16: float = 0.01, bits: int = 0) -> TargetList:
     """Return the target list that a frame carries.
 
     Args:
         frame: Reply to a target list request; SD3 means 32 bit, SD2 16 bit.
         range_step_16: Range step of a 16-bit list in m, 0.001 for some models (errata I6).
+        bits: Bits per value that were asked for; 0 = any.
 
     Raises:
-        FrameError: Length and number of targets do not fit each other.
+        FrameError: It has another resolution, or length and number of targets do not fit.
     """
     pdu = frame.pdu
     if len(pdu) < 2:
@@ -97,7 +98,10 @@ def decode_target_list(frame: Frame, range_step_16: float = 0.01) -> TargetList:
     output, count = pdu[0], pdu[1]
     if count == CLIPPING:
         return TargetList(output, clipping=True)
-    form = _format(32 if frame.delimiter is Delimiter.SD3 else 16, range_step_16)
+    sent = 32 if frame.delimiter is Delimiter.SD3 else 16
+    if bits and sent != bits:
+        raise FrameError(f"target list of {sent} bit instead of {bits}: {frame}")
+    form = _format(sent, range_step_16)
     size = form.struct.size
     if count > MAX_TARGETS or len(pdu) < 2 + count * size or (len(pdu) - 2) % size:
         raise FrameError(f"target list of {len(pdu)} bytes does not hold {count} targets "

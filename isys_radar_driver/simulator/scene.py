@@ -11,24 +11,29 @@ from isys_radar_driver.targets import Target
 Scene = Callable[[float], list[Target]]
 
 
-def scene_of(model: Model) -> Scene:
+def scene_of(model: Model, count: int = 3) -> Scene:
     """Return the truth: the targets in front of a model at a time in s since the epoch.
 
     Velocities are positive when approaching and angles positive to the left, as on the wire.
     Ranges and velocities stay within what the model can report.
+
+    Args:
+        model: The model.
+        count: Number of targets, as far as the model has so many.
     """
     span = model.range_max or 40.0
-    count = 3 if max(model.max_targets.values()) > 1 else 1
+    count = min(count, max(model.max_targets.values()))
 
     def scene(now: float) -> list[Target]:
         targets = []
         for index in range(count):
-            centre, amplitude = span * (0.25 + 0.2 * index), span * 0.05
-            phase = 2 * math.pi * now / (8.0 + 3.0 * index) + index
+            centre, amplitude = span * (0.25 + 0.6 * index / count), span * 0.05
+            period = 8.0 + 3.0 * (index % 10)
+            phase = 2 * math.pi * now / period + index
             distance = centre + amplitude * math.sin(phase)
-            speed = amplitude * math.cos(phase) * 2 * math.pi / (8.0 + 3.0 * index)
-            angle = math.radians(20.0) * math.sin(2 * math.pi * now / (11.0 + index) + index)
-            signal = 60.0 - 10.0 * index - 5.0 * math.log10(max(distance, 0.1))
+            speed = amplitude * math.cos(phase) * 2 * math.pi / period
+            angle = math.radians(20.0) * math.sin(2 * math.pi * now / (3.0 + period) + index)
+            signal = 60.0 - 30.0 * index / count - 5.0 * math.log10(max(distance, 0.1))
             targets.append(Target(
                 signal, -speed if model.velocity_max else 0.0,
                 distance if model.range_max else 0.0,

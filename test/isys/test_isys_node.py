@@ -853,6 +853,7 @@ def test_a_radar_that_is_unplugged_is_waited_for_and_found_again(ros, lab, launc
     lines = len(process.lines)
     _, again = lab.start("iSYS-4001", link=link, baud_rate=FAST_LINE)
     process.wait_for_line("connected to iSYS-4001", lines)
+    process.wait_for_line("wrote output1.range_max: 150 m → 42 m", lines)
     assert again.value("output1.range_max") == 42.0
     wait_for_points(radar)
     process.stop()

@@ -1,0 +1,125 @@
+"""A line with simulated radars whose time is simulated as well: hours of measuring in seconds.
+
+The link takes the place of the serial port, and the clock that of the module `time` in all modules
+of the driver. Time passes only while the driver waits, so the machine's load changes nothing.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import random
+
+from driver_common import device_bus
+from driver_common.serial_link import BITS_PER_BYTE
+from isys_radar_driver import access, acquisition, connection, line, radar, session
+from isys_radar_driver.models import find_model
+from isys_radar_driver.simulator import radar as simulated_radar
+from isys_radar_driver.simulator.line import SimulatedRadars
+from isys_radar_driver.simulator.radar import SimulatedRadar
+
+MODULES = (access, acquisition, connection, device_bus, line, radar, session, simulated_radar)
+EPOCH = 1_700_000_000.0  # s
+
+
+class VirtualTime:
+    """What the driver uses of the module `time`."""
+
+    def __init__(self):
+        self.now = 100.0
+
+    def monotonic(self):
+        return self.now
+
+    def time(self):
+        return EPOCH + self.now
+
+    def time_ns(self):
+        return round((EPOCH + self.now) * 1e9)
+
+    def sleep(self, seconds):
+        self.now += max(seconds, 0.0)
+
+
+class Damage:
+    """Hurts bytes at random: drop, flip, double, delay, split, all with the same probability."""
+
+    KINDS = ("drop", "flip", "double", "delay", "split")
+
+    def __init__(self, rate, seed=1):
+        self.rate = rate
+        self._random = random.Random(seed)
+
+    def spares(self, length):
+        """Return the probability that so many bytes arrive as they are, maybe late."""
+        return (1 - 0.6 * self.rate) ** length
+
+    def apply(self, data):
+        """Return the pieces that arrive, each with the time in s by which it is later."""
+        pieces, late = [(0.0, bytearray())], 0.0
+        for byte in data:
+            arrives = bytes((byte,))
+            if self._random.random() < self.rate:
+                kind = self._random.choice(self.KINDS)
+                if kind == "flip":
+                    arrives = bytes((byte ^ 1 << self._random.randrange(8),))
+                if kind in ("delay", "split"):
+                    late += self._random.uniform(0, 0.03) if kind == "delay" else 0.0
+                    pieces.append((late, bytearray()))
+                arrives = {"drop": b"", "double": 2 * arrives}.get(kind, arrives)
+            pieces[-1][1].extend(arrives)
+        return [(late, bytes(piece)) for late, piece in pieces if piece]
+
+
+class VirtualLink:
+    """A `SerialLink` to simulated radars.
+
+    Attributes:
+        replies: What the radars sent.
+        damage: What happens to the bytes, in both directions.
+    """
+
+    def __init__(self, clock, *models):
+        self.port = "virtual"
+        self.clock = clock
+        self.radars = [SimulatedRadar(find_model(model)) for model in models]
+        self.devices = SimulatedRadars(self.radars)
+        self.baud_rate = self.devices.baud_rate
+        self.damage = Damage(0.0)
+        self.replies = set()
+        self._events = []
+        self._order = itertools.count()
+        self._arrived = bytearray()
+        self._free = 0.0
+
+    def seconds(self, length):
+        return length * BITS_PER_BYTE / self.baud_rate
+
+    def close(self):
+        """Nothing is left open."""
+
+    def write(self, data):
+        self._transmit(self.clock.now, data, self._receive)
+
+    def read(self, timeout):
+        end = self.clock.now + max(timeout, 0.0)
+        while True:
+            while self._events and self._events[0][0] <= self.clock.now:
+                due, _, take, data = heapq.heappop(self._events)
+                take(due, data)
+            if self._arrived or self.clock.now >= end:
+                data, self._arrived = bytes(self._arrived), bytearray()
+                return data
+            self.clock.now = min(end, *(event[0] for event in self._events[:1]), end)
+
+    def _transmit(self, now, data, take):
+        for late, piece in self.damage.apply(data):
+            now += self.seconds(len(piece))
+            heapq.heappush(self._events, (now + late, next(self._order), take, piece))
+
+    def _receive(self, now, data):
+        for due, reply in self.devices.receive(data, now):
+            due = max(due, self._free)
+            self._free = due + self.seconds(len(reply))
+            self._transmit(due, reply, lambda _, piece: self._arrived.extend(piece))
+            self.replies.add(reply)
