@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from sensor_tools.demo.machine import Array
 
 ENOUGH = 0.95  # share of the values that must be within their tolerance
 
@@ -30,6 +31,8 @@ class Comparison:
         curve_seconds: Times of the curves, which are the truth.
         curves: Their values, one row per time and one column per track.
         curve_places: Positions of the truth.
+        delay: By how much in s all stamps are late.
+        delay_limit: By how much they may be.
         remark: What else is to be said.
     """
 
@@ -46,18 +49,25 @@ class Comparison:
     curves: Array
     places: Array = field(default_factory=lambda: np.empty((0, 2)))
     curve_places: Array = field(default_factory=lambda: np.empty((0, 0, 2)))
+    delay: float = 0.0
+    delay_limit: float = math.inf
     remark: str = ""
 
     @property
     def agrees(self) -> bool:
         """Whether the measurements agree with the truth."""
-        return bool(np.mean(self.errors <= self.tolerances) >= ENOUGH)
+        return (abs(self.delay) <= self.delay_limit
+                and bool(np.mean(self.errors <= self.tolerances) >= ENOUGH))
 
     def __str__(self) -> str:
         """Say how well the measurements agree with the truth, in one line."""
         half, most = np.quantile(self.errors, (0.5, ENOUGH), method="higher")
         within = np.count_nonzero(self.errors <= self.tolerances)
-        return (f"{within} of {self.errors.size} values are as near to the truth as resolution "
-                f"and timing allow; {self.error_name}: median {half:.3g}, "
-                f"95 % below {most:.3g}, allowed {np.min(self.tolerances):.3g} to "
-                f"{np.max(self.tolerances):.3g}" + (f"; {self.remark}" if self.remark else ""))
+        remarks = [f"common delay {1e3 * self.delay:.2g} ms, allowed {1e3 * self.delay_limit:.2g}"
+                   ] if self.delay_limit < math.inf else []
+        return "; ".join([
+            f"{within} of {self.errors.size} values are as near to the truth as resolution and "
+            "timing allow",
+            f"{self.error_name}: median {half:.3g}, 95 % below {most:.3g}, allowed "
+            f"{np.min(self.tolerances):.3g} to {np.max(self.tolerances):.3g}",
+            *remarks, *filter(None, [self.remark])])

@@ -17,25 +17,17 @@ from isys_radar_driver.models import FAST, find_model
 from isys_radar_driver.simulator.scene import scene_of
 from msg_conversions.point_cloud import FIELD_NAMES
 from sensor_tools.demo import picture
-from sensor_tools.demo.comparison import Array, Comparison
+from sensor_tools.demo.comparison import Comparison
+from sensor_tools.demo.machine import Array, Machine
+from sensor_tools.demo.processes import Program
 from uc4000_driver.commands import STEP as ULTRASONIC_STEP
 from uc4000_driver.simulator.scene import scene_of as filling_of
 from uc4000_driver.telegram import FACTORY_ADDRESS
 
 STH_RESOLUTION = Calibration.of_range(SENSOR_RANGE).slope * STANDARD_GRAVITY  # m/s²
 TIMING = 0.010  # s by which a stamp may be off
-
-
-@dataclass(frozen=True)
-class Program:
-    """`main` of a module with its arguments.
-
-    "{directory}" in an argument stands for a directory that the programs of a demonstration share
-    and that vanishes with them, "{port}" for a free TCP port, the same for a whole family.
-    """
-
-    module: str
-    arguments: tuple[str, ...]
+COMMON_DELAY = 0.003  # s by which all stamps of a topic may be late
+LATEST = 3.0  # 95 % of the turns of a busy machine are not later than so many times the mean
 
 
 @dataclass(frozen=True)
@@ -64,7 +56,7 @@ class Family:
     simulator: Program
     node: Program
     topics: tuple[Topic, ...]
-    compare: Callable[[Sequence[Any]], Comparison]
+    compare: Callable[[Sequence[Any], Machine], Comparison]
     panels: tuple[picture.Panel, ...]
 
 
@@ -77,7 +69,23 @@ RADAR = find_model("iSYS-4001")
 RANGE_STEP, ANGLE_STEP = 0.01, math.radians(0.01)  # the coarser of its target lists
 
 
-def compare_radar(messages: Sequence[Any]) -> Comparison:
+def common_delay(errors: Array, speeds: Array) -> float:
+    """Return the delay in s of the stamps that explains position errors best, whatever the others.
+
+    Args:
+        errors: What was measured minus the truth at the stamps, shape (values, coordinates).
+        speeds: The derivatives of the truth.
+    """
+    if not errors.size:
+        return 0.0
+    weights = np.sum(speeds ** 2, axis=1)
+    delays = -np.sum(errors * speeds, axis=1) / np.maximum(weights, 1e-12)
+    order = np.argsort(delays)
+    sums = np.cumsum(weights[order])
+    return float(delays[order][np.searchsorted(sums, sums[-1] / 2)])
+
+
+def compare_radar(messages: Sequence[Any], machine: Machine) -> Comparison:
     """Compare point clouds with the simulator's scene: each target with the nearest point."""
     scene = scene_of(RADAR)
 
@@ -86,70 +94,99 @@ def compare_radar(messages: Sequence[Any]) -> Comparison:
                           target.range * math.sin(target.angle)) for target in scene(now)])
 
     times = np.array([seconds_of(message) for message in messages])
-    rows = []
-    for now, message in zip(times, messages, strict=True):
-        points = np.frombuffer(message.data, "<f4").reshape(-1, len(FIELD_NAMES))[:, :2]
-        speeds = np.linalg.norm(truth(now + 1e-3) - truth(now - 1e-3), axis=1) / 2e-3
-        for track, (place, speed) in enumerate(zip(truth(now), speeds, strict=True)):
-            distances = np.linalg.norm(points - place, axis=1)
-            x, y = points[distances.argmin()] if points.size else (math.nan, math.nan)
-            resolution = RANGE_STEP + math.hypot(*place) * ANGLE_STEP
-            rows.append((now, track, x, y, distances.min(initial=math.inf),
-                         resolution + TIMING * speed))
-    seconds, tracks, x, y, errors, tolerances = np.array(rows, float).T
+    places = np.array([truth(now) for now in times])  # shape (messages, targets, 2)
+    speeds = np.array([truth(now + 1e-3) - truth(now - 1e-3) for now in times]) / 2e-3
+    measured = np.array([_nearest(message, there)
+                         for message, there in zip(messages, places, strict=True)])
+    late = TIMING + LATEST * machine.lateness(times)
+    tolerances = (RANGE_STEP + np.linalg.norm(places, axis=2) * ANGLE_STEP
+                  + late[:, np.newaxis] * np.linalg.norm(speeds, axis=2))
+    errors = np.nan_to_num(np.linalg.norm(measured - places, axis=2), nan=math.inf)
+    there = np.isfinite(errors)
+    targets = places.shape[1]
     curve_times = np.linspace(times[0], times[-1], 2 * len(times))
     curve_places = np.array([truth(now) for now in curve_times])
     return Comparison(
-        "range [m]", "position error [mm]", seconds=seconds - times[0], tracks=tracks.astype(int),
-        names=[f"target {track + 1}" for track in range(curve_places.shape[1])],
-        measured=np.hypot(x, y), errors=1e3 * errors, tolerances=1e3 * tolerances,
-        places=np.stack((x, y), axis=1), curve_seconds=curve_times - times[0],
-        curves=np.linalg.norm(curve_places, axis=2), curve_places=curve_places)
+        "range [m]", "position error [mm]", seconds=np.repeat(times - times[0], targets),
+        tracks=np.tile(np.arange(targets), len(times)),
+        names=[f"target {track + 1}" for track in range(targets)],
+        measured=np.linalg.norm(measured, axis=2).ravel(), errors=1e3 * errors.ravel(),
+        tolerances=1e3 * tolerances.ravel(), places=measured.reshape(-1, 2),
+        curve_seconds=curve_times - times[0], curves=np.linalg.norm(curve_places, axis=2),
+        curve_places=curve_places, delay=common_delay((measured - places)[there], speeds[there]),
+        delay_limit=COMMON_DELAY + float(np.median(machine.lateness(times))))
+
+
+def _nearest(message: Any, places: Array) -> Array:
+    """Return the point of a cloud that is nearest to each place, NaN where there is none."""
+    points = np.frombuffer(message.data, "<f4").reshape(-1, len(FIELD_NAMES))[:, :2]
+    if not points.size:
+        return np.full_like(places, math.nan)
+    distances = np.linalg.norm(points - places[:, np.newaxis], axis=2)
+    return points[distances.argmin(axis=1)].astype(float)
 
 
 VIBRATION_TIMING = 0.0002  # s by which single samples may be off, beside a common delay
+DELAY_STEP, GRID = VIBRATION_TIMING / 4, 1_000_000  # s, and how many of them at most
+PIECE = 1000  # samples that are shifted together
 
 
-def compare_vibration(messages: Sequence[Any]) -> Comparison:
+def vibration_in_x(times: Array) -> Array:
+    """Return the truth in m/s² at times in s since the epoch."""
+    return vibration(times)[:, 0] * STANDARD_GRAVITY
+
+
+def compare_vibration(messages: Sequence[Any], machine: Machine) -> Comparison:
     """Compare accelerations in x with the simulator's vibration, but for a delay they share.
 
     The radio and the bus delay all samples alike, which nothing in the data can show; the delay
-    is fitted, and must be smaller than `TIMING`.
+    is fitted. Where the machine was so late that the stamps cannot be that good, pieces of the
+    stream may be shifted by as much as it was late; their values must fit as well as elsewhere.
     """
-    def truth(times: Array) -> Array:
-        return vibration(times)[:, 0] * STANDARD_GRAVITY
-
     times = np.array([seconds_of(message) for message in messages])
     measured = np.array([message.linear_acceleration.x for message in messages])
-    part = slice(0, len(times), max(1, len(times) // 20000))
-    delays = np.arange(-TIMING, TIMING, VIBRATION_TIMING / 4)
-    delay = min(delays, key=lambda delay: float(np.mean(
-        (truth(times[part] - delay) - measured[part]) ** 2)))
-    true = truth(times - delay)
+    late = machine.lateness(times)
+    part = slice(0, len(times), max(1, len(times) // 5000))
+    delay = best_delay(times[part], measured[part], TIMING)
+    delays = np.full_like(times, delay)
+    for start in range(0, len(times), PIECE):
+        piece = slice(start, start + PIECE)
+        if late[piece].max() > VIBRATION_TIMING:
+            delays[piece] += best_delay(times[piece] - delay, measured[piece], late[piece].max())
+    true_times = times - delays
+    true = vibration_in_x(true_times)
     step = VIBRATION_TIMING / 2
-    slopes = np.abs(truth(times - delay + step) - truth(times - delay - step)) / (2 * step)
-    seconds = times - times[0]
-    even = np.linspace(0.0, seconds[-1], len(seconds))
+    slopes = np.abs(vibration_in_x(true_times + step) - vibration_in_x(true_times - step))
+    even = np.linspace(0.0, times[-1] - times[0], len(times))
     return Comparison(
-        "acceleration [m/s²]", "acceleration error [m/s²]", seconds=seconds,
+        "acceleration [m/s²]", "acceleration error [m/s²]", seconds=times - times[0],
         tracks=np.zeros(len(times), np.int64), names=["x"], measured=measured,
-        errors=np.abs(measured - true),
-        tolerances=2 * STH_RESOLUTION + slopes * VIBRATION_TIMING,
-        curve_seconds=even, curves=truth(even + times[0] - delay)[:, np.newaxis],
-        remark=f"common delay {1e3 * delay:.2g} ms")
+        errors=np.abs(measured - true), tolerances=2 * STH_RESOLUTION + slopes,
+        curve_seconds=even, curves=vibration_in_x(even + times[0] - delay)[:, np.newaxis],
+        delay=delay, delay_limit=COMMON_DELAY + float(np.median(late)))
+
+
+def best_delay(times: Array, measured: Array, reach: float) -> float:
+    """Return the delay in s, at most `reach`, with which stamps fit the vibration best."""
+    steps = math.ceil(reach / DELAY_STEP)
+    places = np.clip(np.round((times - times[0]) / DELAY_STEP), 0, GRID).astype(int)
+    grid = vibration_in_x(
+        times[0] + np.arange(-steps, places.max() + steps + 1) * DELAY_STEP)
+    misfits = [np.mean((grid[places + step] - measured) ** 2) for step in range(2 * steps + 1)]
+    return float(steps - np.argmin(misfits)) * DELAY_STEP
 
 
 FILL_LEVEL_RATE = 10.0  # Hz
 
 
-def compare_fill_level(messages: Sequence[Any]) -> Comparison:
+def compare_fill_level(messages: Sequence[Any], machine: Machine) -> Comparison:
     """Compare ranges with the simulator's container; too close to measure is -inf (REP-117)."""
     truth = np.vectorize(filling_of(FACTORY_ADDRESS), otypes=[float])
     times = np.array([seconds_of(message) for message in messages])
     measured = np.array([message.range for message in messages])
     true = truth(times)
     speeds = np.abs(truth(times + 1e-3) - truth(times - 1e-3)) / 2e-3
-    tolerances = ULTRASONIC_STEP + TIMING * speeds
+    tolerances = ULTRASONIC_STEP + (TIMING + LATEST * machine.lateness(times)) * speeds
     too_close = measured == -math.inf
     hidden = too_close & (true < messages[0].min_range + tolerances)
     errors = np.where(hidden, 0.0, np.abs(np.where(too_close, math.inf, measured) - true))

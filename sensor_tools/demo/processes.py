@@ -9,9 +9,8 @@ import signal
 import socket
 import subprocess
 import sys
+from dataclasses import dataclass
 from pathlib import Path
-
-from sensor_tools.demo.families import Program
 
 STOP_TIME = 5.0  # s that a process may take to end
 TAIL = 10  # lines of a log that are worth showing
@@ -19,6 +18,18 @@ _ROOT = Path(__file__).resolve().parent.parent.parent
 _SET_PARENT_DEATH_SIGNAL = 1  # prctl(2)
 _CODE = ("from sensor_tools.demo.processes import end_with_parent; end_with_parent({parent}); "
          "from {module} import main; main()")
+
+
+@dataclass(frozen=True)
+class Program:
+    """`main` of a module with its arguments.
+
+    "{directory}" in an argument stands for a directory that the programs of a demonstration share
+    and that vanishes with them, "{port}" for a free TCP port, the same for a whole family.
+    """
+
+    module: str
+    arguments: tuple[str, ...] = ()
 
 
 def end_with_parent(parent: int) -> None:
@@ -47,7 +58,7 @@ class Processes:
         self._directory = directory
         self._running: dict[str, subprocess.Popen[bytes]] = {}
 
-    def start(self, name: str, program: Program, port: int) -> None:
+    def start(self, name: str, program: Program, port: int = 0) -> None:
         """Start a program.
 
         Args:
@@ -59,12 +70,20 @@ class Processes:
         arguments = [argument.format(directory=self._directory, port=port)
                      for argument in program.arguments]
         code = _CODE.format(parent=os.getpid(), module=program.module)
-        with self._log(name).open("wb") as log:
+        with self.log(name).open("wb") as log:
             self._running[name] = subprocess.Popen(
                 [sys.executable, "-c", code, *arguments], stdin=subprocess.DEVNULL, stdout=log,
                 stderr=subprocess.STDOUT, start_new_session=True,
                 env={**os.environ, "PYTHONPATH": path, "PYTHONUNBUFFERED": "1",
                      "RCUTILS_COLORIZED_OUTPUT": "0"})
+
+    def log(self, name: str) -> Path:
+        """Return the file with all that a program printed."""
+        return self._directory / f"{name.replace('/', '_')}.log"
+
+    def numbers(self) -> dict[str, int]:
+        """Return the process number of each program, by its name."""
+        return {name: process.pid for name, process in self._running.items()}
 
     def ended(self) -> list[str]:
         """Return the names of those that run no more."""
@@ -72,7 +91,7 @@ class Processes:
 
     def last_lines(self, name: str) -> str:
         """Return the end of what a program printed, indented."""
-        lines = self._log(name).read_text(errors="replace").splitlines()[-TAIL:]
+        lines = self.log(name).read_text(errors="replace").splitlines()[-TAIL:]
         return "\n".join(f"    {line}" for line in lines or ["(it printed nothing)"])
 
     def __enter__(self) -> Processes:
@@ -89,6 +108,3 @@ class Processes:
             with contextlib.suppress(ProcessLookupError):  # it, or what it has started
                 os.killpg(process.pid, signal.SIGKILL)
             process.wait()
-
-    def _log(self, name: str) -> Path:
-        return self._directory / f"{name.replace('/', '_')}.log"

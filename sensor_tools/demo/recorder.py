@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import shutil
+import struct
 import time
 from collections import deque
 from collections.abc import Iterable
@@ -11,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import rclpy
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
@@ -18,9 +20,11 @@ from rclpy.signals import SignalHandlerOptions
 
 from driver_common.errors import DriverError
 from sensor_tools.demo.families import Topic
+from sensor_tools.demo.machine import Array
 
 DEPTH = 20_000  # messages that may wait for the recorder: 2 s of the fastest sensor
 KEPT = 200_000  # messages of a topic that are kept for the picture
+STAMP = struct.Struct("<4x i I")  # where a serialised message has the stamp of its header
 
 
 class Bag:
@@ -82,6 +86,7 @@ class Channel:
         kind: Class of its messages.
         subscription: Where they come from.
         count: How many came.
+        is_complete: Whether one came that was measured after the end; it is not recorded.
         kept: The last ones, serialised.
     """
 
@@ -89,7 +94,18 @@ class Channel:
     kind: Any
     subscription: Any
     count: int = 0
+    is_complete: bool = False
     kept: deque[bytes] = field(default_factory=lambda: deque(maxlen=KEPT))
+
+    def stamps(self) -> Array:
+        """Return the times of the last messages in s since the epoch."""
+        return np.array([self.stamp_of(data) for data in self.kept])
+
+    @staticmethod
+    def stamp_of(data: bytes) -> float:
+        """Return the time of a serialised message in s since the epoch: its header is first."""
+        seconds, nanoseconds = STAMP.unpack_from(data)
+        return float(seconds + 1e-9 * nanoseconds)
 
     def messages(self) -> list[Any]:
         """Return the last messages."""
@@ -104,6 +120,7 @@ class Recorder:
 
     Attributes:
         channels: The topics with what has come of them.
+        began: When `start` was called, in s since the epoch.
     """
 
     def __init__(self, topics: Iterable[Topic], bag: Bag | None) -> None:
@@ -120,7 +137,7 @@ class Recorder:
             rclpy.try_shutdown()
             raise DriverError(f"ROS does not start: {str(error).splitlines()[0]}") from error
         self._bag = bag
-        self._started = self._elapsed = 0.0
+        self.began = self._started = self._elapsed = 0.0
         self.channels = [self._subscribe(topic) for topic in topics]
 
     def _subscribe(self, topic: Topic) -> Channel:
@@ -139,10 +156,10 @@ class Recorder:
         self.poll()
         for channel in self.channels:
             channel.count = 0
-        self._started = time.monotonic()
+        self.began, self._started = time.time(), time.monotonic()
 
     def stop(self) -> None:
-        """Record what has come until now, and no more."""
+        """Note that the time is over; what was measured until now may come yet."""
         self.poll()
         self._elapsed = self.elapsed
 
@@ -156,6 +173,9 @@ class Recorder:
             handle = channel.subscription.handle
             with handle:
                 while (taken := handle.take_message(channel.kind, True)) is not None:
+                    if self._elapsed and channel.stamp_of(taken[0]) > self.began + self._elapsed:
+                        channel.is_complete = True
+                        continue
                     channel.count += 1
                     if self._started:
                         self._record(channel, *taken)

@@ -1,0 +1,54 @@
+"""Whether as many messages came as were due, where the machine allowed it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from sensor_tools.demo.machine import Array, Machine
+
+WINDOW = 1.0  # s that are judged as a whole
+ENOUGH = 0.9  # share of the messages that must come
+
+
+@dataclass(frozen=True)
+class Completeness:
+    """How many messages came.
+
+    Attributes:
+        came: Messages in the windows that are judged.
+        due: How many there should be in them.
+        busy: Windows that are not judged, because the machine was busy.
+        windows: All windows.
+    """
+
+    came: int
+    due: float
+    busy: int
+    windows: int
+
+    @property
+    def suffices(self) -> bool:
+        """Whether enough came."""
+        return self.came + 1 >= ENOUGH * self.due
+
+
+def count(stamps: Array, rate: float, start: float, end: float, machine: Machine,
+          programs: Iterable[str]) -> Completeness:
+    """Count the messages of a topic.
+
+    Args:
+        stamps: Their times of measurement in s since the epoch.
+        rate: How many a second are due.
+        start: Time since the epoch from which they were recorded.
+        end: The same until when.
+        machine: What the machine did.
+        programs: The programs through which the messages went.
+    """
+    edges: Array = start + WINDOW * np.arange(int((end - start) / WINDOW) + 1, dtype=float)
+    came, _ = np.histogram(stamps, edges) if edges.size > 1 else (np.zeros(0, int), edges)
+    busy = machine.is_busy(programs, edges[:-1] + WINDOW / 2)
+    return Completeness(int(came[~busy].sum()), rate * WINDOW * int((~busy).sum()),
+                        int(busy.sum()), busy.size)
