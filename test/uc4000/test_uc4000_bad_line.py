@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+import contextlib
+import functools
+import itertools
 import math
+import os
 import random
+import threading
 import time
+import tty
 
 import pytest
 import serial
-from uc4000_master import Master, Requests, counts, named, still
+from bus_master import DEADLINE, wait_until
+from uc4000_master import Master, Recorder, Requests, counts, named, still
 
-from driver_common.errors import (
-    NoAnswerError,
-    RefusedError,
-    WrongDeviceError,
-)
+from driver_common.device_thread import DeviceThread
+from driver_common.errors import NoAnswerError, RefusedError, WrongDeviceError
 from driver_common.simulator.line import SimulatedLine
 from uc4000_driver.commands import OpCode
-from uc4000_driver.line import TRANSMISSION_ERRORS
+from uc4000_driver.line import TRANSMISSION_ERRORS, BusyError
 from uc4000_driver.sensor import Options
+from uc4000_driver.session import Uc4000Bus
+from uc4000_driver.simulator.line import SimulatedSensors
+from uc4000_driver.simulator.sensor import SimulatedSensor
 from uc4000_driver.telegram import ErrorCode, Reply, Request
 
 # --- the line's echo ---------------------------------------------------------------------------
@@ -379,3 +386,190 @@ def test_a_reply_to_another_program_is_not_taken_for_ours(connect):
     master = connect.master(line, Options(address=7))
     assert master.distances()[0] == still(0)
     assert master.sensor.address == 7
+
+
+# --- hosts and sensors that are quicker or slower than ours --------------------------------------
+
+@pytest.fixture
+def at_once():
+    """The path of a pseudo-terminal with sensors that answer everything as soon as they read it."""
+    master, slave = os.openpty()
+    tty.setraw(slave)
+    sensors = SimulatedSensors([SimulatedSensor(1), SimulatedSensor(7)])
+    for sensor in sensors.sensors:
+        sensor.scene = lambda now, address=sensor.address: still(address)
+
+    def serve():
+        with contextlib.suppress(OSError):
+            while data := os.read(master, 100):
+                for _, reply in sensors.receive(data, time.monotonic() + 60 * next(minutes)):
+                    os.write(master, reply)
+
+    minutes = itertools.count()  # so that no reply meets another one
+    thread = threading.Thread(target=serve, daemon=True)
+    thread.start()
+    yield os.ttyname(slave)
+    os.close(slave)
+    os.close(master)
+
+
+@pytest.mark.parametrize("groups", [[], ["s1 s7"]])
+def test_a_sensor_that_answers_at_once_is_used(at_once, groups):
+    master = Master(at_once, *named(1, 7), groups=groups)
+    try:
+        master.measure(10)
+        for name, measurement in master.heard.measurements:
+            assert measurement.distance.value == still(int(name[1]))
+        for sensor in master.bus.devices:
+            assert sensor.temperature is not None
+            assert sensor.statistics.outcomes.total() >= 4
+            assert (sensor.statistics.damaged, sensor.statistics.timeouts) == (0, 0)
+        assert (master.heard.lost, master.heard.notes) == ([], [])
+    finally:
+        master.bus.close()
+
+
+class BusyHost:
+    """A host that holds up this process for half a second at every so many-th step of a link."""
+
+    def __init__(self, link, every, *, behind):
+        self._every = every
+        self._behind = behind
+        self._steps = 0
+        for name in ("read", "write"):
+            setattr(link, name, functools.partial(self._do, getattr(link, name)))
+
+    def _do(self, step, argument):
+        self._steps += 1
+        stalls = not self._steps % self._every
+        if stalls and not self._behind:
+            time.sleep(0.5)
+        result = step(argument)
+        if stalls and self._behind:
+            time.sleep(0.5)
+        return result
+
+
+@pytest.mark.parametrize(("every", "behind", "echo"), [
+    (5, False, False), (6, True, True), (7, True, False), (7, False, True)])
+def test_a_busy_host_finds_nothing_wrong_with_the_line(connect, every, behind, echo):
+    line, _ = connect()
+    line.faults.echo = echo
+    master = connect.master(line, Options(temperature_period=0.0))
+    BusyHost(master.bus.line.link, every, behind=behind)
+    assert master.distances(2) == [still(0)] * 2
+    assert master.sensor.statistics.damaged == 0
+    assert (master.heard.lost, master.heard.notes) == ([], [])
+
+
+@pytest.mark.parametrize("behind", [False, True])
+def test_a_group_on_a_busy_host_is_not_mixed_up(connect, behind):
+    line, _ = connect(1, 2, 3)
+    master = connect.master(line, *named(1, 2, 3), groups=["s1 s2 s3"]).find()
+    master.measure(6)
+    BusyHost(master.bus.line.link, 11, behind=behind)
+    master.measure(9)
+    for name, measurement in master.heard.measurements:
+        assert measurement.distance.value == still(int(name[1]) - 1)
+
+
+def test_a_sensor_that_dawdles_is_one_sensor(connect):
+    line, (simulated,) = connect()
+    chance = random.Random(8)
+
+    def dawdle(request, answer):  # as if the sensor's host were held up as well
+        return answer and (answer[0] + chance.choice((0.0, 0.0, 0.5)), answer[1])
+
+    Requests(simulated, dawdle)
+    master = connect.master(line, Options())
+    master.measure(5)
+    assert {measurement.distance.value for _, measurement in master.heard.measurements} == {
+        still(0)}
+    assert not any("several" in str(error) or "damaged" in str(error)
+                   for _, error in master.heard.lost)
+
+
+# --- users who do not want to wait ---------------------------------------------------------------
+
+@pytest.fixture
+def serve(connect):
+    """Start threads that serve a bus, and stop them."""
+    threads = []
+
+    def start(line, *options):
+        heard = Recorder()
+        bus = Uc4000Bus(line.port, options, heard)
+        threads.append(DeviceThread("bus", bus, lambda error: None))
+        threads[-1].start()
+        threads[-1].call(lambda: bus.set_active(True))
+        return threads[-1], bus, heard
+
+    yield start
+    for thread in threads:
+        thread.stop()
+
+
+def test_within_a_long_measurement_users_are_answered(connect, serve):
+    line, (simulated,) = connect()
+    thread, bus, heard = serve(line, Options(address=7, cycles=255))
+    wait_until(lambda: simulated.measurements)
+    with pytest.raises(BusyError, match=r"the line is in use for up to 1\d\.\d s more "
+                                        r"\(address 7: measure\); try again then, or set cycles"):
+        thread.call(lambda: bus.maintenance.write(bus.devices[0], {"gain_db": 60.0}))
+    bus.devices[0].options.cycles = 1
+    assert thread.call(lambda: dict(bus.devices[0].values))["gain_db"] == 72.0
+    thread.call(lambda: bus.set_active(False))
+    (_, end), = simulated.measurements
+    assert time.monotonic() < end  # all that took less time than the measurement, 12.75 s
+    assert heard.measurements == []
+
+
+def test_a_distance_that_comes_after_a_stop_is_not_told(connect, serve):
+    line, (simulated,) = connect()
+    thread, bus, heard = serve(line, Options(address=7, cycles=20, temperature_period=0.0))
+    wait_until(lambda: simulated.measurements)
+    thread.call(lambda: bus.set_active(False))
+    asked = Requests(simulated)
+    wait_until(lambda: asked.all)  # it looks whether the sensor is there, so the wait is over
+    assert heard.measurements == []
+
+
+def test_short_measurements_are_waited_for(connect, serve):
+    line, (simulated,) = connect()
+    thread, bus, _ = serve(line, Options(address=7, cycles=7, temperature_period=0.0))
+    wait_until(lambda: simulated.measurements)
+    for gain in (60.0, 61.0, 62.0):
+        assert thread.call(lambda gain=gain: bus.maintenance.write(
+            bus.devices[0], {"gain_db": gain})) == {"gain_db": gain}
+
+
+class Babbler:
+    """A device that does not stop talking."""
+
+    baud_rate = 19200
+
+    def __init__(self):
+        self.was_asked = threading.Event()
+
+    def receive(self, data, now):
+        self.was_asked.set()
+        return [(now, bytes(20 * 1920))]  # for 20 s
+
+
+def test_on_a_line_full_of_noise_users_are_answered():
+    babbler = Babbler()
+    line = SimulatedLine(babbler).start()
+    bus = Uc4000Bus(line.port, [Options()], Recorder())
+    thread = DeviceThread("bus", bus, lambda error: None)
+    thread.start()
+    try:
+        assert babbler.was_asked.wait(DEADLINE)
+        begin = time.monotonic()
+        thread.call(lambda: bus.set_active(False))
+        with pytest.raises(NoAnswerError, match="is not connected"):
+            thread.call(lambda: bus.maintenance.write(bus.devices[0], {"gain_db": 60.0}))
+        thread.stop()
+        assert time.monotonic() - begin < 5.0  # it was 15 s
+    finally:
+        thread.stop()
+        line.close()
