@@ -13,7 +13,9 @@ LINE_FAULTS = {"drop": "probability that a reply is lost",
                "corrupt": "probability that a byte of a reply is damaged",
                "noise": "probability of random bytes in front of a reply",
                "split": "pause in s in the middle of each reply",
-               "delay": "time in s added before each reply"}
+               "delay": "time in s added before each reply",
+               "damage": "probability that a byte, in either direction, is lost, flipped, "
+                         "doubled or late"}
 
 
 @dataclass(frozen=True)

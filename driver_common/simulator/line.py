@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import heapq
 import itertools
+import math
 import os
 import random
 import select
@@ -17,8 +18,9 @@ import termios
 import threading
 import time
 import tty
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Protocol
 
@@ -26,6 +28,8 @@ from driver_common.errors import LinkError
 from driver_common.serial_link import BITS_PER_BYTE
 
 CHUNK_TIME = 0.002  # s of line time that is written at once
+DAMAGES = ("drop", "flip", "double", "delay", "split")
+PAUSES = {"split": (0.002, 0.010), "delay": (0.02, 0.3)}  # s in front of a byte
 SPEEDS = {getattr(termios, name): int(name[1:]) for name in dir(termios) if name[1:].isdigit()}
 
 
@@ -35,12 +39,15 @@ class SimulatedDevice(Protocol):
     baud_rate: int
 
     def receive(self, data: bytes, now: float) -> Iterable[tuple[float, bytes]]:
-        """Take the master's bytes; return replies, each with the monotonic time it begins."""
+        """Take the master's bytes; return replies, each with the monotonic time it begins.
+
+        Where a silence ends a telegram, no bytes at all mean that there was one.
+        """
 
 
 @dataclass
 class Faults:
-    """How the line misbehaves; probabilities are per reply.
+    """How the line misbehaves; probabilities are per reply, but for `damage`.
 
     Attributes:
         drop: Probability that a reply is lost.
@@ -48,6 +55,8 @@ class Faults:
         noise: Probability that random bytes come in front of it.
         split: Pause in s in the middle of each reply.
         delay: Additional time in s before each reply.
+        damage: Probability that a byte, in either direction, is hurt: lost, one of its bits
+            flipped, doubled, or late, by much or by little.
         echo: Whether the master hears its own bytes.
         silent: Whether nothing gets through.
     """
@@ -57,6 +66,7 @@ class Faults:
     noise: float = 0.0
     split: float = 0.0
     delay: float = 0.0
+    damage: float = 0.0
     echo: bool = False
     silent: bool = False
     random: random.Random = field(default_factory=lambda: random.Random(1))
@@ -75,7 +85,21 @@ class Faults:
         if self.split:
             middle = len(reply) // 2
             return [(due, reply[:middle]), (due + self.split, reply[middle:])]
-        return [(due, reply)]
+        return [(due + delay, piece) for delay, piece in self.hurt(reply)]
+
+    def hurt(self, data: bytes) -> list[tuple[float, bytes]]:
+        """Return the pieces that arrive in place of `data`, each with its delay in s."""
+        pieces = [(0.0, bytearray())]
+        for byte in data:
+            kind = (self.random.choice(DAMAGES)
+                    if self.damage and self.random.random() < self.damage else "")
+            if kind in PAUSES:
+                pause = self.random.uniform(*PAUSES[kind])
+                pieces.append((pieces[-1][0] + pause, bytearray()))
+            if kind == "flip":
+                byte ^= 1 << self.random.randrange(8)
+            pieces[-1][1].extend([byte] * {"drop": 0, "double": 2}.get(kind, 1))
+        return [(delay, bytes(piece)) for delay, piece in pieces if piece]
 
 
 class SimulatedLine:
@@ -86,13 +110,15 @@ class SimulatedLine:
         faults: How the line misbehaves; may be changed at any time.
     """
 
-    def __init__(self, device: SimulatedDevice, *, link: str = "", listen: str = "") -> None:
+    def __init__(self, device: SimulatedDevice, *, link: str = "", listen: str = "",
+                 gap: float = math.inf) -> None:
         """Open the line; `start` serves it.
 
         Args:
             device: What is connected to it.
             link: Path of a symbolic link to the pseudo-terminal.
             listen: "host:port" to serve TCP instead of a pseudo-terminal.
+            gap: Silence in s that ends a telegram of the master.
 
         Raises:
             LinkError: The link or the TCP port cannot be made.
@@ -101,9 +127,11 @@ class SimulatedLine:
         self._device = device
         self._transport = _Tcp(listen) if listen else _Pty(link)
         self.port = self._transport.port
-        self._due: list[tuple[float, int, bytes]] = []
+        self._gap = gap
+        self._due: list[tuple[float, int, Callable[[float], None]]] = []  # what to do, and when
         self._order = itertools.count()
         self._late_until = 0.0
+        self._arrived_until = self._last_arrival = 0.0
         self._busy: list[tuple[float, float]] = []  # when the line is taken, from … until
         self._wake_reader, self._wake_writer = os.pipe()
         self._closed = False
@@ -136,20 +164,41 @@ class SimulatedLine:
             data = self._transport.read(ready)
             if data:
                 self._receive(data, time.monotonic())
-            self._send(time.monotonic())
+            while self._due and self._due[0][0] <= time.monotonic():
+                due, _, action = heapq.heappop(self._due)
+                action(due)
+
+    def _plan(self, due: float, action: Callable[[float], None]) -> None:
+        heapq.heappush(self._due, (due, next(self._order), action))
 
     def _receive(self, data: bytes, now: float) -> None:
         speed = self._transport.speed()
         if speed and speed != self._device.baud_rate:
             data = bytes(byte ^ 0x5A for byte in data)  # what a wrong baud rate makes of them
-        arrived = now + len(data) * self._byte_time
         if self.faults.echo:
             self._schedule(now, data)
-        for due, reply in self._device.receive(data, arrived):
+        for delay, piece in self.faults.hurt(data):
+            due = max(now + delay, self._arrived_until)  # nothing overtakes what is under way
+            self._arrived_until = due + len(piece) * self._byte_time
+            self._plan(due, partial(self._reach_device, piece))
+
+    def _reach_device(self, data: bytes, due: float) -> None:
+        arrived = due + len(data) * self._byte_time
+        self._reply(self._device.receive(data, arrived))
+        self._last_arrival = arrived
+        if self._gap != math.inf:
+            self._plan(arrived + self._gap, self._end_telegram)
+
+    def _end_telegram(self, due: float) -> None:
+        if due >= self._last_arrival + self._gap:  # else more came
+            self._reply(self._device.receive(b"", due))
+
+    def _reply(self, replies: Iterable[tuple[float, bytes]]) -> None:
+        for due, reply in replies:
             for piece_due, piece in self.faults.apply(due, reply):
                 piece_due = max(piece_due, self._late_until)
                 self._schedule(piece_due, piece)
-                if self.faults.delay:
+                if self.faults.delay or self.faults.damage:
                     self._late_until = piece_due  # nothing overtakes what is under way
 
     @property
@@ -163,7 +212,10 @@ class SimulatedLine:
         for start in range(0, len(data), size):
             chunk = data[start:start + size]
             due += len(chunk) * self._byte_time
-            heapq.heappush(self._due, (due, next(self._order), chunk))
+            self._plan(due, partial(self._write, chunk))
+
+    def _write(self, chunk: bytes, due: float) -> None:
+        self._transport.write(chunk)
 
     def _first_free(self, due: float, duration: float) -> float:
         """Return when the line is free for so long, at `due` or later, and take it."""
@@ -174,10 +226,6 @@ class SimulatedLine:
                 due = end
         self._busy = sorted([*self._busy, (due, due + duration)])
         return due
-
-    def _send(self, now: float) -> None:
-        while self._due and self._due[0][0] <= now:
-            self._transport.write(heapq.heappop(self._due)[2])
 
 
 class _Pty:

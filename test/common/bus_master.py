@@ -74,12 +74,12 @@ class BusMaster:
         self.heard = heard
         self.device = bus.devices[0]
 
-    def until(self, condition):
+    def until(self, condition, seconds=DEADLINE):
         """Poll until the condition holds."""
-        deadline = time.monotonic() + DEADLINE
+        deadline = time.monotonic() + seconds
         while not condition():
             assert time.monotonic() < deadline, (
-                f"not within {DEADLINE} s; lost: {self.heard.lost}, notes: {self.heard.notes}")
+                f"not within {seconds} s; lost: {self.heard.lost}, notes: {self.heard.notes}")
             time.sleep(min(self.bus.poll(), 0.02))
 
     def find(self):

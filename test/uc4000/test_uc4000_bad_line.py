@@ -20,10 +20,12 @@ from uc4000_master import Master, Recorder, Requests, counts, named, still
 from driver_common.device_thread import DeviceThread
 from driver_common.errors import NoAnswerError, RefusedError, WrongDeviceError
 from driver_common.simulator.line import SimulatedLine
+from uc4000_driver import commands
 from uc4000_driver.commands import OpCode
 from uc4000_driver.line import TRANSMISSION_ERRORS, BusyError
 from uc4000_driver.sensor import Options
 from uc4000_driver.session import Uc4000Bus
+from uc4000_driver.simulator import sensor as simulated_sensor
 from uc4000_driver.simulator.line import SimulatedSensors
 from uc4000_driver.simulator.sensor import SimulatedSensor
 from uc4000_driver.telegram import ErrorCode, Reply, Request
@@ -573,3 +575,68 @@ def test_on_a_line_full_of_noise_users_are_answered():
     finally:
         thread.stop()
         line.close()
+
+
+# --- figures -------------------------------------------------------------------------------------
+
+def figures(master, line, simulated, damage, count):
+    """Measure on a line that hurts bytes until so many distances arrived whole.
+
+    Returns:
+        Share of the distances that were sent and arrived whole which were told, the most that were
+        missing in a row, and the longest time in s between two.
+    """
+    sent = itertools.count()
+    simulated.scene = lambda now: 0.016 * (16 + next(sent) % 200)  # each one is another one
+    answers, whole = [], []
+
+    def note(request, answer):
+        if request.op_code == OpCode.PROFILE_B and answer and answer[1].acknowledged:
+            answers.append(answer[1].encode())
+        return answer
+
+    apply = line.faults.apply
+
+    def note_whole(due, reply):
+        pieces = apply(due, reply)
+        if answers and reply == answers[-1]:
+            whole.append((answers.pop(), pieces == [(due, reply)]))
+        return pieces
+
+    Requests(simulated, note)
+    line.faults.apply = note_whole
+    line.faults.damage = damage
+    start = len(master.heard.measurements)
+    master.until(lambda: sum(intact for _, intact in whole) >= count, seconds=300.0)
+    told = [measurement for _, measurement in master.heard.measurements[start:]]
+    left = iter(told)
+    after = next(left, None)
+    missing, rows = 0, [0]
+    for reply, intact in whole:
+        if after is not None and round(after.distance.value / 0.016) == reply[0]:
+            after = next(left, None)
+            rows.append(0)
+        elif intact:
+            missing += 1
+            rows[-1] += 1
+    assert after is None  # all that was told had been sent, in this order
+    gaps = [(b.stamp - a.stamp) * 1e-9 for a, b in itertools.pairwise(told)]
+    return 1 - missing / count, max(rows), max(gaps)
+
+
+@pytest.mark.parametrize(("damage", "share"), [(1e-3, 0.98), (1e-2, 0.90)])
+def test_a_line_that_hurts_bytes_costs_little_and_no_truth(
+        one, damage, share, monkeypatch):
+    line, simulated, master = one
+    for module in (commands, simulated_sensor):
+        monkeypatch.setattr(module, "CYCLE_TIME", 0.005)  # to see more of them
+    simulated.evaluation = 0.001
+    master.find()
+    told, missing, gap = figures(master, line, simulated, damage, 300)
+    statistics = master.sensor.statistics
+    print(f"{damage:g} a byte: {told:.1%} of what arrived whole was told, at most {missing} not "
+          f"in a row; longest gap {gap:.2f} s; {statistics.timeouts} time-outs, "
+          f"{statistics.damaged} damaged replies, {statistics.damaged_requests} damaged requests")
+    assert told >= share
+    assert missing <= 3
+    assert master.heard.lost == []

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import pytest
+import serial
+from bus_master import DEADLINE
 
 from driver_common.errors import (
     SettingError,
     WrongDeviceError,
 )
+from driver_common.simulator.line import DAMAGES, Faults
 from uc4000_driver.commands import OpCode
 from uc4000_driver.simulator.line import SimulatedSensors, simulated_line
 from uc4000_driver.simulator.sensor import SimulatedSensor
-from uc4000_driver.telegram import Request
+from uc4000_driver.telegram import GAP, Request
 
 STEP = 0.016  # m
 
@@ -36,13 +39,51 @@ def test_what_the_simulated_sensor_answers(telegram, reply):
     assert answers == ([bytes.fromhex(reply)] if reply else [])
 
 
-def test_the_simulated_sensor_forgets_half_a_request_after_a_gap():
+@pytest.mark.parametrize(("telegram", "reply"), [
+    ("AF", "02 4C"),  # time-out: nothing but the SYNC byte
+    ("AF 35", "03 5D"),  # underflow
+    ("AF 35 FF", "03 5D"),
+    ("AF AF 35 FF 71", "04 7F"),  # overflow
+    ("AE 35 FF", None),  # another address
+    ("35 FF 70", None),  # no SYNC
+])
+def test_what_the_simulated_sensor_says_to_telegrams_of_another_length(telegram, reply):
+    line = SimulatedSensors([SimulatedSensor()])
+    answers = line.receive(bytes.fromhex(telegram), 1.0) + line.receive(b"", 1.0 + GAP)
+    assert [answer for _, answer in answers] == ([bytes.fromhex(reply)] if reply else [])
+    request = Request(7, OpCode.ADDRESS).encode()
+    assert len(line.receive(request, 2.0)) == 1  # what was before is forgotten
+
+
+def test_the_simulated_sensor_waits_for_the_rest_of_a_request_until_a_gap():
     line = SimulatedSensors([SimulatedSensor()])
     request = Request(7, OpCode.ADDRESS).encode()
     assert line.receive(request[:2], 1.000) == []
     assert line.receive(request[2:], 1.010) == []
     assert line.receive(request[:2], 2.000) == []
     assert len(line.receive(request[2:], 2.001)) == 1
+
+
+def test_the_simulated_line_tells_the_sensor_of_a_gap():
+    line, _ = simulated_line()
+    line.start()
+    port = serial.Serial(line.port, 19200, timeout=DEADLINE)
+    port.write(bytes.fromhex("AF 35"))
+    assert port.read(2) == bytes.fromhex("03 5D")
+    port.write(Request(7, OpCode.ADDRESS).encode())
+    assert port.read(2) == bytes.fromhex("07 E7")
+    port.close()
+    line.close()
+
+
+def test_damage_hurts_bytes_in_every_way():
+    faults = Faults(damage=1.0)
+    pieces = [faults.hurt(b"\x00") for _ in range(200)]
+    seen = {("drop" if not piece else "double" if piece[0][1] == b"\0\0" else
+             "flip" if piece[0][1] != b"\0" else "split" if piece[0][0] <= 0.01 else "delay")
+            for piece in pieces}
+    assert seen == set(DAMAGES)
+    assert Faults().hurt(b"\x12\x34") == [(0.0, b"\x12\x34")]
 
 
 def test_simulated_sensors_share_one_wire():

@@ -22,6 +22,8 @@ from uc4000_driver.telegram import (
     Request,
 )
 
+_SYNC = 0xA0
+
 
 class SimulatedSensors:
     """Sensors on one wire, without I/O: the device side of the protocol.
@@ -44,21 +46,18 @@ class SimulatedSensors:
     def receive(self, data: bytes, now: float) -> list[tuple[float, bytes]]:
         """Take the master's bytes; return replies, each with the time at which it begins.
 
-        A request that stays incomplete is forgotten after a gap; a real sensor says so.
+        A request is complete with its four bytes, and ends with a gap in any case: then there are
+        no bytes at all (section 4.5.2).
         """
-        if now - self._last > GAP + len(data) * BYTE_TIME:
+        if data and now - self._last > GAP + len(data) * BYTE_TIME:
             self._buffer.clear()
         self._last = now
         self._buffer += data
-        replies: list[tuple[float, bytes]] = []
-        while len(self._buffer) >= REQUEST_LENGTH:
-            if self._buffer[0] & 0xF0 != 0xA0:
-                del self._buffer[0]
-                continue
-            telegram = bytes(self._buffer[:REQUEST_LENGTH])
-            del self._buffer[:REQUEST_LENGTH]
-            replies += self._answer(telegram, now - len(self._buffer) * BYTE_TIME)
-        return replies
+        if data and len(self._buffer) < REQUEST_LENGTH:
+            return []
+        telegram = bytes(self._buffer)
+        self._buffer.clear()
+        return self._answer(telegram, now)
 
     def _answer(self, telegram: bytes, now: float) -> list[tuple[float, bytes]]:
         self._replies = [reply for reply in self._replies if reply[1] > now - 1.0]
@@ -80,13 +79,25 @@ class SimulatedSensors:
 
 
 def _ask(sensor: SimulatedSensor, telegram: bytes, now: float) -> tuple[float, bytes] | None:
+    """Return when and what a sensor answers; what has no SYNC byte is no telegram."""
+    if not telegram or telegram[0] & 0xF0 != _SYNC:
+        return None
     try:
         answer = sensor.reply(Request.decode(telegram), now)
     except FrameError:
         if sensor.silent or telegram[0] & 0x07 not in (CAST, sensor.address):
             return None
-        answer = now + GAP, Reply(bytes((ErrorCode.CHECKSUM_ERROR,)), acknowledged=False)
+        answer = now + GAP, Reply(bytes((_what_is_wrong(telegram),)), acknowledged=False)
     return (answer[0], answer[1].encode()) if answer else None
+
+
+def _what_is_wrong(telegram: bytes) -> ErrorCode:
+    """Return the error code of a damaged request; the manual only names them (section 4.6.2)."""
+    if len(telegram) == REQUEST_LENGTH:
+        return ErrorCode.CHECKSUM_ERROR
+    if len(telegram) > REQUEST_LENGTH:
+        return ErrorCode.TELEGRAM_OVERFLOW
+    return ErrorCode.TELEGRAM_TIMEOUT if len(telegram) == 1 else ErrorCode.TELEGRAM_UNDERFLOW
 
 
 def _merged(answers: Sequence[tuple[float, bytes]]) -> list[tuple[float, bytes]]:
@@ -120,4 +131,4 @@ def simulated_line(addresses: Sequence[int] = (), *, product: str = PRODUCT, lin
                                f"{FIRST_ADDRESS} … {LAST_ADDRESS}")
     sensors = [SimulatedSensor(address, serial_number=number)
                for number, address in enumerate(addresses or [FACTORY_ADDRESS], 1)]
-    return SimulatedLine(SimulatedSensors(sensors), link=link, listen=listen), sensors
+    return SimulatedLine(SimulatedSensors(sensors), link=link, listen=listen, gap=GAP), sensors
