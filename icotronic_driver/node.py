@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from diagnostic_msgs.msg import DiagnosticStatus
 from sensor_msgs.msg import BatteryState, Imu, PointCloud2, Temperature
+from std_msgs.msg import Float64MultiArray
 
 from driver_common import diagnostics
 from driver_common.device_node import FRAME_ID, TIME_OFFSET, DeviceNode, Topic, run
@@ -31,9 +32,11 @@ from icotronic_driver.settings import SETTINGS
 from icotronic_driver.simulator.line import simulated_network
 from icotronic_driver.streaming import AXES
 from icotronic_driver.values import CLOCK, decode_mac, encode_mac
+from icotronic_driver.vibration import COLUMNS, Vibration
 from msg_conversions.battery import to_battery_state
 from msg_conversions.imu import ImuTemplate, variances_of
 from msg_conversions.imu_batch import ImuBatchTemplate
+from msg_conversions.multi_array import to_float64_multi_array
 from msg_conversions.temperature import to_temperature
 
 SIMULATED = "sim"
@@ -42,6 +45,7 @@ CHANNELS = {channels: code for code, channels in enumerate(
 SIGNED_AXES = {sign + axis: code for code, (sign, axis) in enumerate(
     (sign, axis) for sign in ("", "-") for axis in AXES)}
 STREAM_OPTIONS = ("channels", *(f"axis.{axis}" for axis in AXES), "sample_rate", "batch_period",
+                  "vibration_period",
                   "calibration_source", "acceleration_range_g", "linear_acceleration_stddev",
                   "time_offset")
 READING_UNITS = {"rssi": " [dBm]", "battery_voltage": " [V]", "temperature": " [°C]"}
@@ -100,6 +104,8 @@ class IcotronicNode(DeviceNode, Listener):
                description="Publish each sample as a message of its own, on imu/data_raw"),
         Option("batch_period", kind=float, default=0.02, minimum=0.0, maximum=1.0, unit="s",
                live=True, description="Time whose samples are one message on imu/batch; 0 = off"),
+        Option("vibration_period", kind=float, default=0.0, minimum=0.0, maximum=10.0, unit="s",
+               live=True, description="Time whose samples make one message on vibration; 0 = off"),
         Option("status_period", kind=float, default=8.0, minimum=0.5, maximum=3600.0, unit="s",
                live=True, description="Time in which battery, temperature, RSSI, states and "
                                       "counters are read once"),
@@ -113,7 +119,8 @@ class IcotronicNode(DeviceNode, Listener):
     ALL_SETTINGS = SETTINGS
     TOPICS: Mapping[str, Topic] = {
         "imu/batch": Topic(PointCloud2, BATCH_DEPTH), "imu/data_raw": Topic(Imu, QUEUE_DEPTH),
-        "battery": Topic(BatteryState), "temperature": Topic(Temperature)}
+        "vibration": Topic(Float64MultiArray), "battery": Topic(BatteryState),
+        "temperature": Topic(Temperature)}
 
     def __init__(self) -> None:
         """Declare the parameters; raises SettingError."""
@@ -171,6 +178,7 @@ class IcotronicNode(DeviceNode, Listener):
         """Create topics and services."""
         self._topics = {
             "batch": self.add_publisher(sensor, "imu/batch"),
+            "vibration": self.add_publisher(sensor, "vibration"),
             "battery_voltage": self.add_publisher(sensor, "battery"),
             "temperature": self.add_publisher(sensor, "temperature")}
         if self.option("publish_samples"):
@@ -214,13 +222,14 @@ class IcotronicNode(DeviceNode, Listener):
             self.on_note(sensor, COLLISION, warning=True)
         conversion = Conversion([partial(_linear, channel) for channel in sensor.channels], axes)
         self._stream.finish()
-        self._stream = Stream(self._consumers(axes, conversion), len(axes),
+        self._stream = Stream(self._consumers(sensor, axes, conversion), len(axes),
                               round(self.option("time_offset") * 1e9))
         return self.while_running(self._stream.take)
 
-    def _consumers(self, axes: Sequence[int], conversion: Conversion) -> Iterator[Consumer]:
+    def _consumers(self, sensor: Sensor, axes: Sequence[int],
+                   conversion: Conversion) -> Iterator[Consumer]:
         """Yield those who take the samples of a stream."""
-        frame_id, batch_period = self.option("frame_id"), self.option("batch_period")
+        frame_id = self.option("frame_id")
         if "imu" in self._topics:
             template = ImuTemplate(variances_of(
                 [axis % 3 for axis in axes], self.option("linear_acceleration_stddev")), frame_id)
@@ -228,14 +237,23 @@ class IcotronicNode(DeviceNode, Listener):
             # publish() itself costs twice as much, because it looks at what it was given.
             yield Consumer(topic.get_subscription_count, _publisher(
                 template.serialised, topic.handle.publish_raw, conversion))
-        if batch_period:
-            topic, batch = self._topics["batch"], ImuBatchTemplate(frame_id)
+        batch, batches = ImuBatchTemplate(frame_id), self._topics["batch"]
+        vibration, summaries = Vibration(sensor.sample_rate, conversion.tables), (
+            self._topics["vibration"])
+        labels = ",".join(AXES[axis] for axis in sorted(conversion.tables)), ",".join(COLUMNS)
 
-            def publish(samples: Samples) -> None:
-                topic.publish(batch.serialised(samples.stamps, samples.accelerations))
+        def publish_batch(samples: Samples) -> None:
+            batches.publish(batch.serialised(samples.stamps, samples.accelerations))
 
-            gatherer = Gatherer(batch_period, conversion, publish)
-            yield Consumer(topic.get_subscription_count, gatherer.take, gatherer)
+        def publish_vibration(samples: Samples) -> None:
+            summaries.publish(to_float64_multi_array(vibration.summary(samples), labels))
+
+        for period, publish, topic in (
+                (self.option("batch_period"), publish_batch, batches),
+                (self.option("vibration_period"), publish_vibration, summaries)):
+            if period:
+                gatherer = Gatherer(period, conversion, publish)
+                yield Consumer(topic.get_subscription_count, gatherer.take, gatherer)
 
     def on_step(self, pause: float) -> None:
         """Look who listens to the stream, and hand over what waits for too long."""

@@ -19,6 +19,7 @@ from nodes import NodeProcess, Ros
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import BatteryState, Imu, PointCloud2, Temperature
+from std_msgs.msg import Float64MultiArray
 
 from driver_common.simulator.bus import CanFrame
 from icotronic_driver import commands
@@ -169,7 +170,7 @@ class Station:
 BEGINNING = {
     "channels": "x", "axis.x": "x", "axis.y": "y", "axis.z": "z", "calibration_source": "auto",
     "acceleration_range_g": 100.0, "sample_rate": 500.0, "linear_acceleration_stddev": 0.0,
-    "time_offset": 0.0}
+    "time_offset": 0.0, "vibration_period": 0.0}
 
 
 @pytest.fixture(scope="module")
@@ -308,6 +309,17 @@ def test_channels_are_mapped_to_axes_with_signs(station):
     station.set(channels="xz", linear_acceleration_stddev=0.5)
     imu = station.wait_for_acceleration(-30.0, -10.0, 0.0)
     assert list(imu.linear_acceleration_covariance) == [0.25, 0, 0, 0, 0.25, 0, 0, 0, 1e6]
+
+
+def test_the_vibration_of_a_period_is_published_on_request(station):
+    messages = station.remote.subscribe(Float64MultiArray, "vibration")
+    station.set(channels="xz", vibration_period=0.2)
+    message = station.ros.wait_until(lambda: next(iter(messages), None))
+    axes, columns = message.layout.dim
+    assert (axes.label, axes.size, axes.stride) == ("x,z", 2, 10)
+    assert (columns.label, columns.size) == ("mean,rms,peak,crest_factor,velocity_rms", 5)
+    assert message.data[0::5].tolist() == close_to(10.0, 30.0)
+    assert message.data[1::5].tolist() == pytest.approx([0.0, 0.0], abs=1e-6)
 
 
 def test_two_channels_on_one_axis_are_an_error_in_the_log(station):
