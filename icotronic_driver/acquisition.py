@@ -6,25 +6,21 @@ import contextlib
 import itertools
 import time
 from collections.abc import Callable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING
 
 from driver_common.errors import DriverError, FrameError, NoAnswerError, RefusedError
 from driver_common.sample_clock import HostClock, SampleClock
 from driver_common.settings import Value
 from icotronic_driver import commands
-from icotronic_driver.access import Access
-from icotronic_driver.commands import SELF
-from icotronic_driver.identifier import STH_1, STU_1
+from icotronic_driver.access import READINGS, Access
+from icotronic_driver.identifier import STH_1
 from icotronic_driver.line import Line, StreamHandler
-from icotronic_driver.request import Request
 from icotronic_driver.sensor import Phase, Sensor
 from icotronic_driver.settings import SETTINGS, nearest_adc_configuration
-from icotronic_driver.streaming import StreamDecoder, supply_voltage
+from icotronic_driver.streaming import StreamDecoder
 
 if TYPE_CHECKING:
     from icotronic_driver.session import Listener
-
-T = TypeVar("T")
 
 LISTEN_TIME = 0.05  # s that jobs of others wait at most
 KEEP_ALIVE = 1.0  # s between checks of a connection without a stream
@@ -55,7 +51,7 @@ class Acquisition:
         self._host_clock = HostClock()
         self._told_rate = ""
         self._next_reading = 0.0
-        self._readings = itertools.cycle(_READINGS)
+        self._readings = itertools.cycle(READINGS)
 
     # --- settings ---
 
@@ -85,19 +81,24 @@ class Acquisition:
     def _apply_sample_rate(self) -> None:
         """Turn the wanted sample rate into settings of the ADC."""
         sensor = self._sensor
-        if self.follows_sample_rate:
-            total = sensor.options.sample_rate * sensor.format.channel_count
-            adc = nearest_adc_configuration(total, sensor.adc.reference_voltage)
-            sensor.options.wanted |= {
-                "adc.prescaler": adc.prescaler, "adc.acquisition_time": adc.acquisition_time,
-                "adc.oversampling_rate": adc.oversampling_rate}
-            text = (f"sample_rate {sensor.options.sample_rate:g}/s: nearest is "
-                    f"{adc.sample_rate / sensor.format.channel_count:.6g}/s with prescaler "
-                    f"{adc.prescaler}, acquisition time {adc.acquisition_time} and oversampling "
-                    f"rate {adc.oversampling_rate}")
-            if text != self._told_rate:
-                self._note(text)
-            self._told_rate = text
+        if not self.follows_sample_rate:
+            return
+        if "adc.prescaler" not in sensor.settings:
+            self._note("sample_rate has no effect: the sensor does not tell how its ADC is set",
+                       warning=True)
+            return
+        total = sensor.options.sample_rate * sensor.format.channel_count
+        adc = nearest_adc_configuration(total, sensor.adc.reference_voltage)
+        sensor.options.wanted |= {
+            "adc.prescaler": adc.prescaler, "adc.acquisition_time": adc.acquisition_time,
+            "adc.oversampling_rate": adc.oversampling_rate}
+        text = (f"sample_rate {sensor.options.sample_rate:g}/s: nearest is "
+                f"{adc.sample_rate / sensor.format.channel_count:.6g}/s with prescaler "
+                f"{adc.prescaler}, acquisition time {adc.acquisition_time} and oversampling "
+                f"rate {adc.oversampling_rate}")
+        if text != self._told_rate:
+            self._note(text)
+        self._told_rate = text
 
     def _choose_calibrations(self) -> None:
         for complaint in self._sensor.choose_calibrations():
@@ -106,7 +107,7 @@ class Acquisition:
     def read_again(self) -> None:
         """Read all settings, and take those that changed as wanted; raises DriverError."""
         sensor, before = self._sensor, self._sensor.values
-        sensor.read_all(self._access, SETTINGS, self._note)
+        sensor.read_all(self._access, dict(sensor.settings), self._note)
         changed = {name: value for name, value in sensor.values.items()
                    if value != before.get(name) and value == value}  # NaN is no change
         sensor.options.wanted |= changed
@@ -253,41 +254,19 @@ class Acquisition:
     # --- readings ---
 
     def _read_next(self) -> None:
-        """Read one of the things that are read now and then; what is refused is left out."""
-        period = self._sensor.options.status_period
-        self._next_reading = time.monotonic() + period / len(_READINGS)
-        name, make_request, convert = next(self._readings)
-        try:
-            value = convert(self._sensor, self._line.request(make_request()))
-        except (RefusedError, FrameError, NoAnswerError):
-            value = None
-        setattr(self._sensor.readings, name, value)
-        if value is not None:
-            self._listener.on_readings(self._sensor, name)
+        """Read one of the things that are read now and then, of those that the sensor has."""
+        sensor = self._sensor
+        period = sensor.options.status_period
+        self._next_reading = time.monotonic() + period / len(READINGS)
+        reading = next(self._readings)
+        if reading.name in sensor.readable:
+            try:
+                value = self._access.take_reading(sensor, reading)
+            except (RefusedError, FrameError, NoAnswerError):
+                value = None
+            setattr(sensor.readings, reading.name, value)
+            if value is not None:
+                self._listener.on_readings(sensor, reading.name)
 
     def _note(self, text: str, *, warning: bool = False) -> None:
         self._listener.on_note(self._sensor, text, warning=warning)
-
-
-def _as_it_is(sensor: Sensor, value: T) -> T:
-    return value
-
-
-def _battery_voltage(sensor: Sensor, values: tuple[int, ...]) -> float:
-    return supply_voltage(values[0], sensor.adc.reference_voltage)
-
-
-# What is read now and then: name in Readings, request, conversion.
-_READINGS: tuple[tuple[str, Callable[[], Request[Any]], Callable[[Sensor, Any], Any]], ...] = (
-    ("rssi", lambda: commands.READ_RSSI.request(STH_1, SELF), _as_it_is),
-    ("battery_voltage", lambda: commands.read_voltage(STH_1), _battery_voltage),
-    ("temperature", lambda: commands.READ_TEMPERATURE.request(STH_1), _as_it_is),
-    ("sth_status", lambda: commands.READ_STH_STATUS.request(STH_1), _as_it_is),
-    ("stu_status", lambda: commands.READ_STU_STATUS.request(STU_1), _as_it_is),
-    ("sth_errors", lambda: commands.READ_STH_ERRORS.request(STH_1), _as_it_is),
-    ("stu_errors", lambda: commands.READ_STU_ERRORS.request(STU_1), _as_it_is),
-    ("power_cycles", lambda: commands.READ_POWER_CYCLES.request(STH_1), _as_it_is),
-    ("operating_time", lambda: commands.READ_OPERATING_TIME.request(STH_1), _as_it_is),
-    ("under_voltages", lambda: commands.READ_UNDER_VOLTAGES.request(STH_1), _as_it_is),
-    ("watchdog_resets", lambda: commands.READ_WATCHDOG_RESETS.request(STH_1), _as_it_is),
-)

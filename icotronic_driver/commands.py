@@ -49,6 +49,7 @@ T = TypeVar("T")
 SYSTEM, STREAMING, STATISTICS = 0x00, 0x04, 0x08
 CONFIGURATION, EEPROM, PRODUCT_DATA, TEST = 0x28, 0x3D, 0x3E, 0x3F
 
+BLUETOOTH = (SYSTEM, 0x0B)  # block and command; a sub-command follows
 SELF = 0xFF  # device number: the node itself, not one that it sees
 NAME_LENGTH, FIRST_PART = 8, 6  # bytes of a name, and how many the first frame carries
 EEPROM_CHUNK = 4  # errata C10

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -19,8 +20,8 @@ from icotronic_driver.request import Request
 
 T = TypeVar("T")
 
-REPLY_TIMEOUT = 0.5  # s; behind the stationary unit there is a radio
-ATTEMPTS = 3  # a radio loses frames
+REPLY_TIMEOUT = 0.6  # s; behind the stationary unit there is a radio
+ATTEMPTS = 10  # a radio loses frames; as many as the vendor's client makes (field note N1)
 ENOUGH_BUFFER = 1024 * 1024  # bytes, in which about 0.4 s of the fastest stream fit
 ERROR_BUS_OFF = 0x40  # in the identifier of an error frame of the kernel
 FILTERS = (receiver_filter(SPU_1), (SPU_1 << 6, 0x1F << 6))  # for us; and as if from us
@@ -66,6 +67,7 @@ class Line:
         self.on_stream: StreamHandler | None = None
         self._make_link = partial(CanLink, interface, channel, bitrate, options, FILTERS)
         self._link: CanLink | None = None
+        self._interrupted = threading.Event()
         self.interface = interface
         self.name = f"{interface} {channel}"
 
@@ -78,6 +80,10 @@ class Line:
         if self._link is not None:
             self._link.close()
             self._link = None
+
+    def interrupt(self) -> None:
+        """Have all requests be made once only, from now on; called from another thread."""
+        self._interrupted.set()
 
     @property
     def is_open(self) -> bool:
@@ -138,6 +144,8 @@ class Line:
             LinkError: The bus failed.
         """
         for _ in range(attempts - 1):
+            if self._interrupted.is_set():
+                break
             with contextlib.suppress(NoAnswerError):
                 return self._attempt(request, timeout)
         return self._attempt(request, timeout)
@@ -147,10 +155,8 @@ class Line:
         link.send(request.frame.identifier.encode(), request.frame.data)
         end = time.monotonic() + timeout
         try:
-            while (remaining := end - time.monotonic()) > 0:
-                message = link.receive(remaining)
-                if message is None:
-                    break
+            # What came while this host was busy is looked at, however late that is.
+            while (message := link.receive(max(0.0, end - time.monotonic()))) is not None:
                 streamed = message.arbitration_id == STREAM_ID and message.is_extended_id
                 if streamed and self.on_stream:
                     self.on_stream(message.data, message.timestamp, time.monotonic_ns())

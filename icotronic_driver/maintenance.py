@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import time
 from collections.abc import Callable, Mapping
 from typing import TypeVar
 
@@ -27,6 +28,8 @@ from icotronic_driver.values import CalibrationElement
 
 T = TypeVar("T")
 
+RESET_TIMEOUT = 2.0  # s that a node may take to acknowledge a reset (field note N1)
+RESET_TIME = 2.0  # s that it may take to come up (field note N1)
 RATE_SETTINGS = frozenset({"adc.prescaler", "adc.acquisition_time", "adc.oversampling_rate"})
 
 
@@ -76,7 +79,8 @@ class Maintenance:
         if self._sensor.is_connected:
             with contextlib.suppress(NoAnswerError, RefusedError, FrameError):
                 self._acquisition.stop()
-        self._connection.release()
+        if self._sensor.phase is not Phase.SEARCHING:
+            self._connection.release()
 
     def reconnect(self) -> None:
         """Disconnect, and search again."""
@@ -88,8 +92,9 @@ class Maintenance:
         """Reset the sensor or the stationary unit; the connection comes back by itself."""
         if node == STH_1:
             self._require()
-        self._line.request(commands.RESET.request(node))
+        self._line.request(commands.RESET.request(node), RESET_TIMEOUT, attempts=2)
         self._lose(DriverError("reset, as asked for"))
+        self._sensor.due = time.monotonic() + RESET_TIME
 
     def execute(self, request: Request[T]) -> T:
         """Carry out any request, and read what it may have changed; raises DriverError."""

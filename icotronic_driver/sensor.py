@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from driver_common.device import Device, DeviceOptions
 from driver_common.sample_clock import SampleClock
+from icotronic_driver.settings import SETTINGS
 from icotronic_driver.streaming import (
     AXES,
     LOAD_LIMIT,
@@ -29,12 +30,15 @@ from icotronic_driver.values import (
     Version,
 )
 
+NO_MAC = "00:00:00:00:00:00"
+
 
 class Phase(Enum):
     """Where the sensor is on its way to a stream."""
 
     SEARCHING = "searching"
     CONNECTING = "connecting"
+    GREETING = "greeting"
     CONNECTED = "connected"
 
 
@@ -45,6 +49,11 @@ class SeenSensor(NamedTuple):
     name: str
     mac: str
     rssi: int  # dBm
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether MAC address and RSSI are known; of a new sensor they are not (field note N3)."""
+        return self.mac != NO_MAC and self.rssi != 0
 
     def __str__(self) -> str:
         """Return all of it for people."""
@@ -142,6 +151,7 @@ class Sensor(Device):
         identity: Who it is; None while it is not connected.
         stu_identity: Who the stationary unit is.
         readings: What is read now and then.
+        readable: Names of those that it, or the stationary unit, tells.
         channels: The streamed channels.
         decoder: Decodes the stream; None while there is none.
         clock: Gives the samples of the stream their times.
@@ -160,6 +170,7 @@ class Sensor(Device):
         self.identity: UnitIdentity | None = None
         self.stu_identity: UnitIdentity | None = None
         self.readings = Readings()
+        self.readable: set[str] = set()
         self.channels: list[Channel] = []
         self.eeprom_calibrations: dict[str, Calibration] = {}
         self.decoder: StreamDecoder | None = None
@@ -175,6 +186,20 @@ class Sensor(Device):
     def is_connected(self) -> bool:
         """Whether it was connected and configured."""
         return self.phase is Phase.CONNECTED
+
+    @property
+    def missing(self) -> list[str]:
+        """What a connected sensor, or the stationary unit, does not tell."""
+        assert self.identity is not None
+        assert self.stu_identity is not None
+        groups = {name: name.partition(".")[0] for name in SETTINGS}
+        offered = {groups[name] for name in self.settings}
+        settings = dict.fromkeys(name if group in offered else group
+                                 for name, group in groups.items() if name not in self.settings)
+        return [*settings, *(name.replace("_", " ") for name, value in (
+            *vars(self.identity).items(), *vars(self.readings).items()) if value is None),
+            *(f"{name.replace('_', ' ')} of the stationary unit"
+              for name, value in vars(self.stu_identity).items() if value is None)]
 
     def forget(self) -> None:
         """Take note that the sensor is not connected any more."""

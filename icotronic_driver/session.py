@@ -1,7 +1,7 @@
 """The conversation with a sensor behind a stationary unit: find, connect, configure, stream.
 
 The stationary unit (STU) sits on the bus, the sensor (STH) behind its radio. All of `IcotronicBus`
-runs in one thread (see `driver_common.device_thread`).
+runs in one thread (see `driver_common.device_thread`), but for `interrupt`.
 """
 
 from __future__ import annotations
@@ -71,6 +71,10 @@ class IcotronicBus(DeviceBus[Sensor]):
         self.sensor.forget()
         self.line.close()
 
+    def interrupt(self) -> None:
+        """Have the present step end soon; called from another thread."""
+        self.line.interrupt()
+
     def write(self, sensor: Sensor, changes: Mapping[str, Value]) -> dict[str, Value]:
         """Write settings, all or none, and return what the sensor reports; raises DriverError."""
         return self.maintenance.write(changes)
@@ -97,6 +101,9 @@ class IcotronicBus(DeviceBus[Sensor]):
 
     def _lose(self, sensor: Sensor, error: DriverError) -> None:
         """Note that the sensor is not there; look for it more and more rarely."""
+        if sensor.phase in (Phase.GREETING, Phase.CONNECTED):
+            with contextlib.suppress(DriverError):
+                self._connection.release()
         if sensor.phase is not Phase.SEARCHING:
             self._connection.begin()
         sensor.time_outs += isinstance(error, NoAnswerError)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 from icotronic_driver.simulator.line import simulated_network
+from icotronic_driver.simulator.unit import SILENT_ON
 from sensor_tools.simulation import Simulation, add_faults, fault_commands, set_faults, switch
 
 DESCRIPTION = "ICOtronic accelerometers on a CAN bus, served by socketcand"
@@ -16,6 +17,8 @@ FAULTS = {
     "burst": "time in s for which such frames are held back, to come all at once",
     "answer_loss": "probability that an answer of a sensor is lost",
     "refused_connects": "how many attempts to connect fail",
+    "connect_time": "time in s that a connection takes beyond the shortest",
+    "newness": "time in s in which a new sensor tells no MAC address, no RSSI and half a name",
     "foreign": "frames per s on the bus that belong to something else"}
 
 
@@ -29,6 +32,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--uncalibrated", action="store_true",
                         help="the sensors hold no calibration factors")
     parser.add_argument("--can-fd", action="store_true", help="frames can have 64 bytes")
+    parser.add_argument("--silent-on", choices=SILENT_ON, default="nothing",
+                        help="commands to which all units stay silent: those that the vendor's "
+                             "client leaves unused, or all that are optional for a stream")
     add_faults(parser, FAULTS)
 
 
@@ -39,6 +45,7 @@ def open_simulation(options: argparse.Namespace) -> Simulation:
                                can_fd=options.can_fd)
     network = server.network
     set_faults(network.faults, FAULTS, options)
+    network.stay_silent(options.silent_on)
     server.start()
 
     def away(name: str) -> None:
@@ -53,5 +60,6 @@ def open_simulation(options: argparse.Namespace) -> Simulation:
     names = ", ".join(f"{sensor.name} ({sensor.mac})" for sensor in network.sensors)
     return Simulation(
         f"{server.host}:{server.port}: {names}",
-        {"silent": switch([network.faults], "silent"), "away": away, "back": back,
-         "power-cycle": power_cycle, **fault_commands(network.faults, FAULTS)}, server.close)
+        {"silent": switch([network.faults], "silent"), "silent-on": network.stay_silent,
+         "away": away, "back": back, "power-cycle": power_cycle,
+         **fault_commands(network.faults, FAULTS)}, server.close)

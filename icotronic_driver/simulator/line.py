@@ -83,6 +83,11 @@ class SimulatedNetwork:
                 node.eeprom[counter] = node.eeprom.number(counter) + 1
             node.boot(time.monotonic() if now is None else now)
 
+    def stay_silent(self, on: str) -> None:
+        """Have all units stay silent on some commands; see `SimulatedNode.stay_silent`."""
+        for node in (self.stu, *self.sensors):
+            node.stay_silent(on)
+
     def send(self, frame: CanFrame, due: float | None = None) -> None:
         """Put any frame on the bus."""
         with self.lock:

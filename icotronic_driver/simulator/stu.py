@@ -31,6 +31,9 @@ class Faults:
         burst: Time in s for which such frames are held back, to come all at once.
         answer_loss: Probability that an answer of a sensor is lost.
         refused_connects: How many of the next attempts to connect fail.
+        connect_time: Time in s that a connection takes beyond the shortest.
+        newness: Time in s in which a sensor that was just found tells neither its MAC address nor
+            its RSSI nor all of its name (field note N3).
         foreign: Frames per s on the bus that belong to something else.
         silent: Whether nothing gets through.
     """
@@ -42,6 +45,8 @@ class Faults:
     burst: float = 0.0
     answer_loss: float = 0.0
     refused_connects: int = 0
+    connect_time: float = 0.0
+    newness: float = 0.0
     foreign: float = 0.0
     silent: bool = False
     random: random.Random = field(default_factory=lambda: random.Random(1))
@@ -59,7 +64,7 @@ class SimulatedStu(SimulatedNode):
         sensors: The sensors around it.
         faults: How the system misbehaves.
         active: Whether Bluetooth is activated.
-        found: The sensors that it has found; the index is the device number.
+        found: The sensors that it has found, and when; the index is the device number.
         connected: The sensor to which it has a connection.
         radio_sent: Frames that it sent to sensors.
         radio_received: Frames that it received from them.
@@ -71,7 +76,8 @@ class SimulatedStu(SimulatedNode):
         self.sensors = sensors
         self.faults = faults
         self.connected: SimulatedSth | None = None
-        self.found: list[SimulatedSth] = []
+        self.found: dict[SimulatedSth, float] = {}
+        self._known: list[SimulatedSth] = []  # from an earlier activation (field note N4)
         self._connecting: tuple[SimulatedSth, float] | None = None
         self._subcommands: dict[int, Callable[[bytes, float], bytes]] = {
             1: self._activate, 2: self._count, 3: self._write_name, 4: self._write_name,
@@ -85,17 +91,20 @@ class SimulatedStu(SimulatedNode):
     def boot(self, now: float) -> None:
         """Lose the RAM and the connection."""
         super().boot(now)
+        self._known = []
         self.radio_sent = self.radio_received = 0
         self._deactivate(now)
 
     def update(self, now: float) -> None:
         """Find sensors, finish connecting, and notice a broken connection."""
         if self.active and self.connected is None:
-            self.found = [sensor for sensor in self.found if self._hears(sensor, now)]
-            self.found += [sensor for sensor in self.sensors
+            self.found = {sensor: since for sensor, since in self.found.items()
+                          if self._hears(sensor, now)}
+            self.found |= {sensor: now for sensor in self.sensors
                            if sensor not in self.found and self._hears(sensor, now)
                            and max(self._scanning_since, sensor.advertises_since)
-                           + sensor.advertisement_interval(now) <= now]
+                           + sensor.advertisement_interval(now) <= now}
+            self._known = list(self.found) or self._known
         if self._connecting is not None and now >= self._connecting[1]:
             sensor = self._connecting[0]
             self._connecting = None
@@ -126,8 +135,7 @@ class SimulatedStu(SimulatedNode):
     def _deactivate(self, now: float) -> None:
         self._disconnect(now)
         self.active = False
-        self.found = []
-        self._asked = False
+        self.found = {}
         self._connecting = None
         self._broken_since = math.inf
         self._confirm_mac = False
@@ -144,7 +152,11 @@ class SimulatedStu(SimulatedNode):
         return head + handler(payload, now).ljust(6, b"\0")
 
     def _device(self, number: int) -> SimulatedSth | None:
-        return self.found[number] if self.active and number < len(self.found) else None
+        return list(self.found)[number] if self.active and number < len(self.found) else None
+
+    def _is_new(self, sensor: SimulatedNode, now: float) -> bool:
+        return (isinstance(sensor, SimulatedSth) and self.connected is None
+                and now < self.found.get(sensor, -math.inf) + self.faults.newness)
 
     def _activate(self, payload: bytes, now: float) -> bytes:
         if not self.active:
@@ -153,7 +165,6 @@ class SimulatedStu(SimulatedNode):
         return b""
 
     def _count(self, payload: bytes, now: float) -> bytes:
-        self._asked = True
         return str(len(self.found)).encode()
 
     def _write_name(self, payload: bytes, now: float) -> bytes:
@@ -162,10 +173,14 @@ class SimulatedStu(SimulatedNode):
 
     def _read_name(self, payload: bytes, now: float) -> bytes:
         node = self if payload[1] == SELF else self._device(payload[1])
-        return node._name_part(payload[0]) if node else b""
+        if node is None or (payload[0] == 6 and self._is_new(node, now)):
+            return b""  # of a new sensor only the first part is there
+        return node._name_part(payload[0])
 
     def _connect_number(self, payload: bytes, now: float) -> bytes:
-        return bytes((self._connect(self._device(payload[1]), now),))
+        number = payload[1]
+        known = self._known[number] if number < len(self._known) else None
+        return bytes((self._connect(self._device(number) or known, now),))
 
     def _connect_mac(self, payload: bytes, now: float) -> bytes:
         """Answer with the address once, when the connection stands, else with zeros."""
@@ -173,18 +188,19 @@ class SimulatedStu(SimulatedNode):
         if self.connected is not None:
             confirm, self._confirm_mac = self._confirm_mac, False
             return encode_mac(self.connected.mac)[::-1] if confirm else b""
-        sensor = next((one for one in self.found if encode_mac(one.mac) == wanted), None)
+        sensor = next((one for one in (*self.found, *self._known)
+                       if encode_mac(one.mac) == wanted), None)
         self._confirm_mac = self._connect(sensor, now)
         return b""
 
     def _connect(self, sensor: SimulatedSth | None, now: float) -> bool:
-        """Begin to connect; whether a sensor was found and the unit is searching."""
-        if not (self.active and self._asked) or sensor is None or self.connected is not None:
-            return False  # asking for the devices first is required, section 10.2.6
+        """Begin to connect; whether the sensor is known and the unit is searching."""
+        if not self.active or sensor is None or self.connected is not None:
+            return False
         if self.faults.refused_connects > 0:
             self.faults.refused_connects -= 1
         elif self._connecting is None:
-            self._connecting = sensor, now + CONNECT_TIME
+            self._connecting = sensor, now + CONNECT_TIME + self.faults.connect_time
         return True
 
     def _check_connected(self, payload: bytes, now: float) -> bytes:
@@ -196,11 +212,11 @@ class SimulatedStu(SimulatedNode):
 
     def _rssi(self, payload: bytes, now: float) -> bytes:
         sensor = self.connected if payload[1] == SELF else self._device(payload[1])
-        return struct.pack("b", sensor.rssi if sensor else 0)
+        return struct.pack("b", 0 if sensor is None or self._is_new(sensor, now) else sensor.rssi)
 
     def _read_mac(self, payload: bytes, now: float) -> bytes:
         node = self if payload[1] == SELF else self._device(payload[1])
-        return encode_mac(node.mac)[::-1] if node else b""
+        return b"" if node is None or self._is_new(node, now) else encode_mac(node.mac)[::-1]
 
     def _energy_times(self, payload: bytes, now: float) -> bytes:
         return self._energy(payload[0], payload)

@@ -4,9 +4,20 @@ from __future__ import annotations
 
 import struct
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 
-from icotronic_driver.commands import EEPROM, EEPROM_CHUNK, PRODUCT_DATA, STATISTICS, SYSTEM, TEST
+from driver_common.errors import SettingError
+from icotronic_driver.commands import (
+    BLUETOOTH,
+    CONFIGURATION,
+    EEPROM,
+    EEPROM_CHUNK,
+    PRODUCT_DATA,
+    STATISTICS,
+    STREAMING,
+    SYSTEM,
+    TEST,
+)
 from icotronic_driver.eeprom import PAGE_SIZE, Field, FieldValue, Status
 from icotronic_driver.eeprom import PRODUCT_DATA as PRODUCT_PAGE
 from icotronic_driver.eeprom import STATISTICS as STATISTICS_PAGE
@@ -17,6 +28,15 @@ BOOT_TIME = 0.2  # s without answers after a reset
 STARTUP_TIME = 0.1  # s after it in which a node says it starts up
 
 NOT_AVAILABLE, GENERAL_ERROR, WRITE_NOT_ALLOWED, UNSUPPORTED_FORMAT = 1, 2, 3, 4  # section 10.9
+
+
+UNUSED = {(CONFIGURATION, 0x60), (CONFIGURATION, 0x61), (CONFIGURATION, 0xC0)}
+NEEDED = {(SYSTEM, 0x01), (STREAMING, 0x00),
+          *((*BLUETOOTH, number) for number in (1, 2, 5, 6, 7, 8, 9, 12, 17, 18))}
+SILENT_ON: Mapping[str, Callable[[tuple[int, ...]], bool]] = {
+    "nothing": lambda command: False,
+    "unused": lambda command: command in UNUSED or command[0] in (STATISTICS, PRODUCT_DATA),
+    "optional": lambda command: command not in NEEDED}
 
 
 class Refusal(Exception):  # noqa: N818
@@ -101,6 +121,7 @@ class SimulatedNode:
         eeprom: Its EEPROM.
         state: Its network state, as far as it was set.
         refuse: Commands, as (block, block command), which it refuses although it could.
+        ignore: Those to which it stays silent, as real units do (field note N2).
     """
 
     def __init__(self, number: int, mac: str, fields: dict[str, Field], name_field: str) -> None:
@@ -109,12 +130,13 @@ class SimulatedNode:
         self.mac = mac
         self.eeprom = SimulatedEeprom(fields)
         self.refuse: set[tuple[int, int]] = set()
+        self.ignore: set[tuple[int, ...]] = set()
         self._name_field = name_field
         self._host = SPU_1
         self._handlers: dict[tuple[int, int], Handler] = {
             (SYSTEM, 0x01): self._reset, (SYSTEM, 0x02): self._state_command,
             (SYSTEM, 0x05): self._node_status, (SYSTEM, 0x06): self._error_status,
-            (SYSTEM, 0x0B): self._bluetooth,
+            BLUETOOTH: self._bluetooth,
             (STATISTICS, 0x00): self._power_cycles, (STATISTICS, 0x01): self._operating_time,
             (STATISTICS, 0x02): lambda _, now: self._counter("Under Voltage Counter"),
             (STATISTICS, 0x03): lambda _, now: self._counter("Watchdog Reset Counter"),
@@ -137,6 +159,24 @@ class SimulatedNode:
     def name(self, name: str) -> None:
         self.eeprom[self._name_field] = name
 
+    def stay_silent(self, on: str) -> None:
+        """Stay silent on some commands: "nothing", "unused" or "optional" ones.
+
+        Unused are those that the vendor's client never sends, optional those without which a sensor
+        can be found, connected and streamed from.
+        """
+        try:
+            self.ignore = {command for command in self._commands() if SILENT_ON[on](command)}
+        except KeyError:
+            raise SettingError(f"there is no silence on {on!r}, only on "
+                               f"{', '.join(SILENT_ON)}") from None
+
+    def _commands(self) -> Iterator[tuple[int, ...]]:
+        """Yield all commands, those of Bluetooth with their sub-command."""
+        for command in self._handlers:
+            yield from ([(*command, number) for number in range(256)] if command == BLUETOOTH
+                        else [command])
+
     def boot(self, now: float) -> None:
         """Lose the RAM and begin anew; a reset counts as power-on (section 8.2.1.3.1)."""
         self.state = NetworkState.OPERATING
@@ -154,6 +194,9 @@ class SimulatedNode:
         command = request.block, request.block_command
         handler = self._handlers.get(command)
         self._host = request.sender
+        if command in self.ignore or (
+                command == BLUETOOTH and (*command, payload[0]) in self.ignore):
+            return None
         try:
             if handler is None or command in self.refuse:
                 raise Refusal(NOT_AVAILABLE)

@@ -29,7 +29,7 @@ from driver_common.errors import (
 )
 from driver_common.simulator import bus as simulated_bus
 from driver_common.simulator.bus import CanFrame
-from icotronic_driver import acquisition, commands, connection
+from icotronic_driver import acquisition, commands, connection, maintenance
 from icotronic_driver.access import Access
 from icotronic_driver.commands import CONFIGURATION, EEPROM, STREAMING, SYSTEM
 from icotronic_driver.eeprom import STH_EEPROM, STU_EEPROM, Status
@@ -43,6 +43,7 @@ from icotronic_driver.simulator.line import SimulatedIcotronic, simulated_networ
 from icotronic_driver.streaming import STANDARD_GRAVITY
 from icotronic_driver.values import AdcConfiguration, NetworkState
 
+PATIENCE, CONNECT_TIMEOUT = connection.PATIENCE, connection.CONNECT_TIMEOUT
 RATE = 38.4e6 / (3 * 21 * 64)  # values/s after a reset
 SETTLED = 1.0  # s after which the clock of a stream is near the truth, on a machine that is busy
 RAW_TOLERANCE = 20  # ADC steps of 3 mg; times since the epoch are rounded to 0.2 µs
@@ -133,7 +134,7 @@ def quick(monkeypatch):
     for module, name, value in (
             (connection, "SETTLE_TIME", 0.05), (connection, "PATIENCE", 0.4),
             (connection, "CONNECT_POLL", 0.02), (acquisition, "KEEP_ALIVE", 0.2),
-            (acquisition, "SILENCE", 0.4)):
+            (acquisition, "SILENCE", 0.4), (maintenance, "RESET_TIME", 0.15)):
         monkeypatch.setattr(module, name, value)
 
 
@@ -142,8 +143,9 @@ def impatient(monkeypatch):
     """Do not wait long for answers, where none comes."""
     request = Line.request
     monkeypatch.setattr(Line, "request",
-                        lambda line, asked, timeout=0.15: request(line, asked, timeout))
-    monkeypatch.setattr(connection, "DISCONNECT_TIMEOUT", 0.1)
+                        lambda line, asked, timeout=0.15, attempts=3: request(
+                            line, asked, min(timeout, 0.15), attempts))
+    monkeypatch.setattr(connection, "RELEASE_TIMEOUT", 0.1)
 
 
 @pytest.fixture
@@ -285,6 +287,79 @@ def test_a_sensor_that_advertises_rarely_is_waited_for(start, listen, monkeypatc
     assert host.heard.lost == []
 
 
+def test_a_second_sensor_that_advertises_rarely_is_seen_before_one_is_taken(start, listen):
+    server = start("Spindle", "Tool-7")
+    asleep = server.network.sensor("Tool-7")
+    asleep.eeprom["Sleep Time 1"], asleep.eeprom["Advertisement Time 1"] = 0.001, 0.3
+    assert "2 sensors are in range" in str(listen(server).lose())
+    assert PATIENCE > 2.5  # s; no sensor advertises less often (field note N5)
+
+
+@pytest.mark.parametrize("options", [{}, {"sensor_name": "Test-STH"},
+                                     {"sensor_mac": "08:6B:D7:01:DE:81"}])
+def test_a_new_sensor_is_taken_once_it_tells_name_mac_and_rssi(start, listen, options):
+    server = start()
+    server.network.faults.newness = 0.3
+    host = listen(server, **options)
+    host.until(lambda: host.sensor.seen)
+    assert [one[1:] for one in host.bus.maintenance.scan()] == [
+        ("Test-S", "00:00:00:00:00:00", 0)]
+    host.until(lambda: host.sensor.is_connected)
+    assert host.sensor.target == (0, "Test-STH", "08:6B:D7:01:DE:81", -52)
+
+
+def test_a_sensor_that_stays_new_is_not_taken_and_named(start, listen):
+    server = start()
+    server.network.faults.newness = 10**6
+    assert str(listen(server).lose()) == (
+        "no sensor has told its name, its MAC address and its RSSI yet (in range: "
+        '"Test-S" (00:00:00:00:00:00, number 0, 0 dBm))')
+
+
+@pytest.mark.parametrize("seconds", [3.5, 12.5, 14.0, 19.5])
+def test_a_connection_may_take_20_s(start, listen, monkeypatch, seconds):
+    scale = 0.05  # everything is that much faster
+    monkeypatch.setattr(connection, "CONNECT_RETRY", 3.0 * scale)
+    monkeypatch.setattr(connection, "CONNECT_TIMEOUT", CONNECT_TIMEOUT * scale)
+    server = start()
+    server.network.faults.connect_time = seconds * scale
+    host = listen(server, sensor_name="Test-STH")
+    host.until(lambda: host.sensor.is_connected)
+    assert host.heard.lost == []
+
+
+@pytest.mark.parametrize("options", [{}, {"sensor_name": "Test-STH"}, {"sensor_number": 0}])
+def test_a_connection_that_comes_after_the_time_out_is_kept(start, listen, monkeypatch, options):
+    monkeypatch.setattr(connection, "CONNECT_TIMEOUT", 0.2)
+    server = start()
+    server.network.faults.connect_time = 1.0
+    host = listen(server, **options)
+    assert "does not connect" in str(host.lose())
+    host.until(lambda: host.sensor.is_connected)
+    host.stream()
+    assert host.heard.notes == []
+
+
+def test_a_greeting_that_fails_leaves_no_sensor_connected(start, listen, impatient):
+    server = start()
+    server.network.sensors[0].ignore.add((SYSTEM, 0x0B, 5))  # it does not even tell its name
+    error = str(listen(server).lose())
+    assert "STH 1 does not answer" in error
+    assert server.network.stu.connected is None
+
+
+def test_a_configuration_that_fails_leaves_no_sensor_connected(start, listen, impatient):
+    server = start()
+    simulated = server.network.sensors[0]
+    host = listen(server, wanted={"adc.prescaler": 5})
+    host.until(lambda: host.sensor.phase is Phase.CONNECTING)
+    write = simulated._handlers[CONFIGURATION, 0x00]
+    simulated._handlers[CONFIGURATION, 0x00] = lambda payload, now: (
+        None if payload[0] & 0x80 else write(payload, now))
+    assert "STH 1 does not answer" in str(host.lose())
+    assert server.network.stu.connected is None
+
+
 def test_a_connect_that_is_refused_is_asked_for_again(start, listen, monkeypatch):
     monkeypatch.setattr(connection, "CONNECT_RETRY", 0.2)
     server = start()
@@ -329,6 +404,16 @@ def test_a_connection_that_an_ended_host_left_is_given_up_for_the_wanted_sensor(
     assert host.sensor.identity.name == "Tool-7"
     assert server.network.stu.connected is server.network.sensor("Tool-7")
     assert not server.network.sensor("Spindle").streams
+
+
+def test_a_connection_that_an_ended_host_left_is_kept_where_it_is_the_wanted_one(start, listen):
+    server = start("Spindle", "Tool-7")
+    ended = Host(server, sensor_name="Spindle", channels="xyz").find()
+    ended.stream()
+    ended.bus.line.close()
+    host = listen(server, sensor_name="Spindle").find()
+    assert host.heard.notes == ["keeping a connection that was left over"]
+    assert_true(server.network.sensor("Spindle"), host.stream())
 
 
 def test_a_connection_of_a_living_host_is_left_alone(start, listen):
@@ -766,9 +851,75 @@ def test_reading_this_and_that_loses_no_frame_of_the_stream(connect):
     assert readings.power_cycles == (1, 0)
 
 
-def test_a_reading_that_the_firmware_lacks_is_left_out(connect):
-    host, _, simulated = connect(status_period=0.5)
-    simulated.refuse.add((STREAMING, 0x20))
+# --- what a unit does not have -----------------------------------------------------------------
+
+@pytest.mark.parametrize(("silent_on", "offered", "missing"), [
+    ("unused", {"name", "adc", "used_sensor", "reduced_energy", "lowest_energy"},
+     ["calibration", "led", "gtin", "power cycles", "production date of the stationary unit"]),
+    ("optional", {"name"},
+     ["adc", "used_sensor", "calibration", "reduced_energy", "led", "firmware", "battery voltage",
+      "temperature", "stu status"])])
+def test_a_unit_that_is_silent_on_what_is_optional_is_used(
+        start, listen, monkeypatch, silent_on, offered, missing):
+    waited, asked = [], []
+    attempt = Line._attempt
+
+    def noted(line, request, timeout):
+        asked.append((request.frame.identifier.receiver, request.name))
+        try:
+            return attempt(line, request, timeout)
+        except NoAnswerError:
+            waited.append(timeout)
+            raise
+
+    monkeypatch.setattr(Line, "_attempt", noted)
+    server = start()
+    server.network.stay_silent(silent_on)
+    host = listen(server, status_period=0.5)
+    host.bus.set_active(True)
+    host.find()
+    assert 0.5 < sum(waited) < 1.0  # s
+    assert {name.partition(".")[0] for name in host.sensor.settings} == offered
+    (note,) = [text for text in host.heard.notes if text.startswith("not offered")]
+    assert note.startswith("not offered, because there is no answer: ")
+    assert set(missing) < set(note.partition(": ")[2].split(", "))
+    asked.clear()
+    assert_true(server.network.sensors[0], host.more(2500))
+    if silent_on == "optional":
+        assert {name for _, name in asked} == {"read the RSSI"}
+    assert host.heard.lost == []
+    server.network.stay_silent("nothing")
+    host.bus.maintenance.reconnect()
+    host.find()
+    assert host.sensor.settings.keys() == SETTINGS.keys()
+    assert host.heard.notes.count(note) == 1
+
+
+def test_a_request_is_made_as_often_as_the_vendors_client_makes_it(connect, monkeypatch):
+    host, network, _ = connect()
+    lost = iter([True] * 9)
+    ask = network._ask
+    monkeypatch.setattr(network, "_ask", lambda *args: next(lost, False) or ask(*args))
+    assert host.bus.line.request(commands.READ_LED.request(STH_1), 0.03)
+    assert next(lost, None) is None
+
+
+def test_an_answer_that_waited_for_a_busy_host_counts(connect, monkeypatch):
+    host, *_ = connect()
+    send = host.bus.line.link.send
+
+    def send_and_sleep(*frame):
+        send(*frame)
+        time.sleep(0.2)  # another process has the processor
+
+    monkeypatch.setattr(host.bus.line.link, "send", send_and_sleep)
+    assert host.bus.line.request(commands.READ_LED.request(STH_1), 0.05, attempts=1)
+
+
+def test_a_reading_that_the_firmware_lacks_is_left_out(start, listen):
+    server = start()
+    server.network.sensors[0].refuse.add((STREAMING, 0x20))
+    host = listen(server, status_period=0.5).find()
     host.stream()
     host.until(lambda: len(host.heard.readings.get("temperature", ())) >= 2)
     assert "battery_voltage" not in host.heard.readings
@@ -1098,7 +1249,7 @@ def test_a_firmware_that_lacks_a_setting_is_told(start, listen):
     server = start()
     server.network.sensors[0].refuse.add((CONFIGURATION, 0xC0))
     host = listen(server).find()
-    assert host.heard.warnings == ["this firmware has no led"]
+    assert host.heard.notes == ["not offered, because there is no answer: led"]
     assert "led" not in host.sensor.settings
     host.stream()
 

@@ -139,13 +139,20 @@ def test_connecting_by_mac_address_says_so_once() -> None:
     assert host.network.stu.connected is host.sensors[1]
 
 
-def test_connecting_without_asking_for_the_devices_fails() -> None:  # section 10.2.6
+def test_what_an_earlier_activation_showed_can_be_connected_at_once() -> None:  # field note N4
     host = Host()
+    by_number = commands.CONNECT_NUMBER.request(STU, 0)
     host.ask(commands.ACTIVATE_BLUETOOTH.request(STU))
-    assert not host.ask(commands.CONNECT_NUMBER.request(STU, 0))
-    host.ask(commands.COUNT_DEVICES.request(STU))
     assert not host.ask(commands.CONNECT_NUMBER.request(STU, 1))
-    assert host.ask(commands.CONNECT_NUMBER.request(STU, 0))
+    host.wait(0.1)
+    host.ask(commands.DEACTIVATE_BLUETOOTH.request(STU))
+    assert not host.ask(by_number)
+    for request in (by_number, commands.CONNECT_MAC.request(STU, host.sensors[0].mac)):
+        host.ask(commands.ACTIVATE_BLUETOOTH.request(STU))
+        host.ask(request)
+        host.wait(0.1)
+        assert host.ask(commands.CHECK_CONNECTED.request(STU))
+        host.ask(commands.DEACTIVATE_BLUETOOTH.request(STU))
 
 
 def test_connecting_may_need_several_attempts() -> None:
