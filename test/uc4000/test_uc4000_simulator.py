@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 import serial
 from bus_master import DEADLINE
@@ -105,6 +107,25 @@ def test_a_simulated_sensor_that_hears_another_is_disturbed():
     assert disturbed[0] == round(0.25 / STEP)
     (_, alone), = line.receive(Request(2, OpCode.PROFILE_B, 0xFE).encode(), 3.0)
     assert alone[0] == 3.2 / STEP
+
+
+@pytest.mark.parametrize(("celsius", "reply"), [
+    (-25.0, "E7 F3"), (math.nan, "0B 7F"), (200.0, "0B 7F")])
+def test_a_simulated_sensor_with_a_broken_thermometer_says_so(celsius, reply):
+    sensor = SimulatedSensor()
+    sensor.temperature = celsius
+    (_, answer), = SimulatedSensors([sensor]).receive(
+        Request(7, OpCode.TEMPERATURE).encode(), 1.0)
+    assert answer == bytes.fromhex(reply)
+
+
+def test_a_simulated_sensor_may_answer_at_once():
+    sensor = SimulatedSensor()
+    sensor.at_once = True
+    (due, answer), = SimulatedSensors([sensor]).receive(
+        Request(7, OpCode.PROFILE_B, 0x00).encode(), 1.0)
+    assert due == 1.0
+    assert len(answer) == 2
 
 
 def test_an_unknown_product_and_address():

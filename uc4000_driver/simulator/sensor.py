@@ -47,11 +47,12 @@ class SimulatedSensor:
     Attributes:
         address: Its address.
         scene: The truth: distance in m at a time in s since the epoch, None = nothing there.
-        temperature: In °C.
+        temperature: In °C; NaN = its thermometer is broken.
         version: What it says its version is.
         codes: Stored raw values by op-code; they survive a power cycle (errata U11).
         refuse: Error codes with which it refuses, by op-code.
         silent: Whether it does not answer.
+        at_once: Whether it answers without measuring first.
         evaluation: Time in s from the last cycle to the reply.
         limits: Smallest and largest distance in m that it reports as one.
         overreach: In dB, by which it hears more than its profiles promise.
@@ -69,6 +70,7 @@ class SimulatedSensor:
         self.codes: dict[int, int] = {}
         self.refuse: dict[int, int] = {}
         self.silent = False
+        self.at_once = False
         self.evaluation = EVALUATION
         self.limits = LIMITS
         self.overreach = 0.0
@@ -117,15 +119,24 @@ class SimulatedSensor:
             return self._measure(request, now)
         if request.op_code in _RECORDS or request.op_code == OpCode.ADDRESS:
             return self._read_or_write(request, now)
-        try:
-            data = {OpCode.CAST: bytes((self.address,)), OpCode.VERSION: self.version,
-                    OpCode.TEMPERATURE: round(self.temperature).to_bytes(1, "big", signed=True),
-                    OpCode.SERIAL_NUMBER: self.serial_number.encode()}[OpCode(request.op_code)]
-        except (KeyError, ValueError):
-            raise Refusal(ErrorCode.OP_CODE_ERROR) from None
+        known: dict[int, bytes] = {
+            OpCode.CAST: bytes((self.address,)), OpCode.VERSION: self.version,
+            OpCode.TEMPERATURE: self._temperature_code(),
+            OpCode.SERIAL_NUMBER: self.serial_number.encode()}
+        data = known.get(request.op_code)
+        if data is None:
+            raise Refusal(ErrorCode.OP_CODE_ERROR)
         if request.is_write:
             raise Refusal(ErrorCode.OBJECT_IS_READ_ONLY)
+        if not data:
+            raise Refusal(ErrorCode.TEMPERATURE_ERROR)
         return now + GAP, Reply(data)
+
+    def _temperature_code(self) -> bytes:
+        """Return the data byte of the temperature (errata U5), none where it has none."""
+        if not -128 <= self.temperature <= 127:  # or not a number: its thermometer is broken
+            return b""
+        return round(self.temperature).to_bytes(1, "big", signed=True)
 
     def _read_or_write(self, request: Request, now: float) -> tuple[float, Reply]:
         if not request.is_write:
@@ -164,7 +175,8 @@ class SimulatedSensor:
         distance = statistics.fmean(echoes) if echoes else None
         if any(other.measurements and other.measurements[-1][1] > now for other in self.hears):
             distance = self.limits[0]  # the burst of the other one
-        return end + self.evaluation, Reply(bytes((self._distance_code(distance),)))
+        due = now if self.at_once else end + self.evaluation
+        return due, Reply(bytes((self._distance_code(distance),)))
 
     def _distance_code(self, distance: float | None) -> int:
         """Return the data byte of a distance (errata U4)."""
