@@ -7,6 +7,7 @@ they are up to date.
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import re
 import sys
@@ -44,6 +45,7 @@ class Driver:
         models: The settings of each model.
         examples: Values to show where the default, or the first possible value, is of no use.
         table: File name of the list of settings.
+        keeping: Whether a device keeps what is written to it.
     """
 
     name: str
@@ -52,6 +54,7 @@ class Driver:
     models: Mapping[str, Mapping[str, Setting]]
     examples: Mapping[str, Value]
     table: str
+    keeping: str = "it is not stored there for good"
 
     @property
     def options(self) -> tuple[Option, ...]:
@@ -80,7 +83,8 @@ DRIVERS = (
            {"STH": SETTINGS}, {"can_channel": "can0", "name": "Spindle"},
            "icotronic_settings.md"),
     Driver("uc4000", "Pepperl+Fuchs UC4000 ultrasonic sensors", Uc4000Node,
-           {"UC4000": UC4000_SETTINGS}, {"serial_port": "/dev/ttyUSB0"}, "uc4000_settings.md"),
+           {"UC4000": UC4000_SETTINGS}, {"serial_port": "/dev/ttyUSB0"}, "uc4000_settings.md",
+           keeping="the sensor itself stores it for good"),
 )
 
 
@@ -105,8 +109,8 @@ def parameter_file(driver: Driver) -> str:
     lines += [
         "", "", "    # ---- The device ----",
         *_comment("What is not given stays as it is in the device. What is given is written to it "
-                  "at every start, unless config_mode says otherwise; it is not stored there for "
-                  "good. The values shown are examples.", 4)]
+                  f"at every start, unless config_mode says otherwise; {driver.keeping}. The "
+                  "values shown are examples.", 4)]
     for name in _by_group(name for name in driver.node.ALL_SETTINGS if driver.variants(name)):
         variants = driver.variants(name)
         setting = next(iter(variants.values()))
@@ -126,17 +130,28 @@ def _explained(row: Parameter, variants: Iterable[Parameter]) -> str:
     ranges = {variant.limits: _range(variant) for variant in variants}
     widest = ranges[max(ranges, key=lambda limits: limits[1] or 0)].replace("`", "")
     what = "one of " if row.choices is not None else ""
-    step = f" in steps of {_step(row)} {row.unit}" if _step(row) else ""
+    step = f" in steps of {_step(row)} {row.unit}".rstrip() if _step(row) else ""
+    values = "only " + _values(row) if _values(row) else ""
     less = " (less on some models)" if len(ranges) > 1 else ""
     section = f"manual {row.section}" if isinstance(row, Setting) else ""
     return "; ".join(filter(None, (
-        row.description, f"{what}{widest} {row.unit}".strip() + less + step, section)))
+        row.description, f"{what}{widest} {row.unit}".strip() + less + step, values, section)))
 
 
 def _step(row: Parameter) -> str:
-    """Return the step of a float, "" for others."""
+    """Return the step of a float or of allowed values, "" where there is none."""
+    if isinstance(row, Setting) and row.values:
+        steps = {above - below for below, above in itertools.pairwise(row.values)}
+        return f"{steps.pop():g}" if len(steps) == 1 else ""
     fine = isinstance(row, Setting) and row.kind is float and row.factor != 1
     return f"{row.factor:g}" if fine else ""  # type: ignore[attr-defined]
+
+
+def _values(row: Parameter) -> str:
+    """Return the allowed values where they have no common step."""
+    if not isinstance(row, Setting) or not row.values or _step(row):
+        return ""
+    return ", ".join(map("{:g}".format, row.values))
 
 
 def _by_group(names: Iterable[str]) -> list[str]:
@@ -197,7 +212,7 @@ def _setting_rows(driver: Driver) -> Iterator[list[str]]:
         variants = driver.variants(name)
         ranges = _ranges_of_models(variants or {"": setting}, driver)
         row = [f"`{name}`", TYPES[setting.kind], setting.unit, ranges,
-               _step(setting), _models(variants, driver),
+               _step(setting) or _values(setting), _models(variants, driver),
                setting.section, _description(setting, variants, driver)]
         found = re.search(r"(?<=[a-z])\d", name)
         number = found[0] if found else ""

@@ -13,7 +13,14 @@ from driver_common.settings import suggestion
 from uc4000_driver import commands
 from uc4000_driver.access import Access
 from uc4000_driver.commands import Distance, Profile
-from uc4000_driver.exchange import ADAPTER_LATENCY, REPLY_SPREAD, most_together, stagger
+from uc4000_driver.exchange import (
+    ADAPTER_LATENCY,
+    REPLY_SPREAD,
+    REPLY_TIME,
+    REQUEST_TIME,
+    most_together,
+    stagger,
+)
 from uc4000_driver.line import Answer, Line
 from uc4000_driver.sensor import Measurement, Sensor
 from uc4000_driver.telegram import GAP
@@ -151,9 +158,11 @@ class Acquisition:
         self._sensors = sensors
         self._wants = wants
         self._listener = listener
+        self._checked: list[tuple[float, int]] = []  # rates and cycles, when last looked at
 
     def measure(self, sensor: Sensor) -> None:
         """Measure with a sensor, and with those of its group that are due; raises DriverError."""
+        self._check_rates()
         if sensor.wants_temperature:
             self._read_temperature(sensor)
         group = self.group_of(sensor)
@@ -173,6 +182,39 @@ class Acquisition:
             self._measure_alone(sensor, group)
         else:
             group.note_success()
+
+    def _check_rates(self) -> None:
+        """Say once where a rate cannot be reached."""
+        asked = [(sensor.options.rate, sensor.options.cycles) for sensor in self._sensors]
+        if asked == self._checked:
+            return
+        self._checked = asked
+        for sensor in self._sensors:
+            reachable = self.reachable_rate(sensor)
+            if sensor.options.rate > reachable:
+                self._listener.on_note(
+                    sensor, f"rate = {sensor.options.rate:g} Hz cannot be reached: with cycles = "
+                            f"{sensor.options.cycles}, and what the others on the line are to do, "
+                            f"it will be about {reachable:.1f} Hz", warning=True)
+
+    def reachable_rate(self, sensor: Sensor) -> float:
+        """Return how often in Hz it can measure about, beside what the others are to do."""
+        needs = {other: self._time_of(other) for other in self._sensors}
+        others = [other for other in self._sensors if other is not sensor]
+        taken = sum(other.options.rate * needs[other] for other in others)
+        turn = needs[sensor] + sum(needs[other] for other in others if not other.options.rate)
+        return max((1 - taken) / turn, 1 / sum(needs.values()))
+
+    def _time_of(self, sensor: Sensor) -> float:
+        """Return the time in s that a measurement takes of the line, a share of it in a group."""
+        cycles, group = sensor.options.cycles, self.group_of(sensor)
+        alone = REQUEST_TIME + cycles * commands.CYCLE_TIME + REPLY_SPREAD / 2 + REPLY_TIME + GAP
+        members = [other for other in self._sensors if self.group_of(other) is group
+                   and other.options.cycles == cycles] if group else []
+        if group is None or len(members) < 2:
+            return alone
+        count = min(len(members), most_together(cycles, group.latency))
+        return ((count - 1) * stagger(group.latency) + alone) / count
 
     def group_of(self, sensor: Sensor) -> Group | None:
         """Return the group of a sensor, None where it measures alone."""

@@ -160,6 +160,33 @@ def test_the_rate_is_kept(one):
     assert 3.0 < master.sensor.rate < 7.0
 
 
+@pytest.mark.parametrize(("rates", "cycles", "groups", "reachable"), [
+    ([20.0], 1, [], 16.9),
+    ([20.0], 10, [], 2.0),
+    ([0.0, 0.0, 0.0], 1, [], 5.63),
+    ([20.0, 5.0], 1, [], 11.9),  # 5 Hz take 30 % of the line
+    ([20.0, 20.0], 1, [], 8.45),
+    ([20.0, 20.0, 20.0], 1, ["s1 s2 s3"], 10.07),
+])
+def test_the_rate_that_can_be_reached(rates, cycles, groups, reachable):
+    options = [Options(f"s{number}", address=number, rate=rate, cycles=cycles)
+               for number, rate in enumerate(rates, 1)]
+    bus = Uc4000Bus("", options, Listener(), groups=groups)
+    assert bus.acquisition.reachable_rate(bus.devices[0]) == pytest.approx(reachable, abs=0.06)
+
+
+def test_a_rate_that_cannot_be_reached_is_warned_of_once(one):
+    _, _, master = one
+    master.sensor.options.rate = 10.0
+    master.measure(2)
+    assert master.heard.warnings == []
+    master.sensor.options.cycles = 4
+    master.measure(3)
+    assert master.heard.warnings == [
+        "rate = 10 Hz cannot be reached: with cycles = 4, and what the others on the line are to "
+        "do, it will be about 4.8 Hz"]
+
+
 def test_without_a_rate_a_sensor_measures_as_fast_as_it_can(one):
     _, simulated, master = one
     master.measure(12)
