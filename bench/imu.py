@@ -1,65 +1,40 @@
-"""The whole path: from a CAN frame to Imu messages that a subscriber in another process has.
-
-The subscriber is this process. It takes the serialised messages straight from the middleware,
-because the executor of rclpy could not follow the faster streams.
-"""
+"""The whole path of a sample: from a CAN frame to an Imu, or a batch, that a subscriber has."""
 
 from __future__ import annotations
 
-import itertools
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
 
-import rclpy
-from rclpy.node import Node
-from rclpy.qos import QoSProfile
-from rclpy.signals import SignalHandlerOptions
-from rclpy.subscription import Subscription
-from sensor_msgs.msg import Imu
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import PointCloud2
 
 from bench.measure import Cost, Failure, Process, Row, in_turn
+from bench.receiver import (
+    BARE_LOOP,
+    BATCHES,
+    IDIOMATIC,
+    MATCH_TIME,
+    PAUSE,
+    SAMPLES,
+    Program,
+    Receiver,
+    Running,
+)
 from icotronic_driver.settings import nearest_adc_configuration
 from icotronic_driver.values import AdcConfiguration
 
 SENSOR_RATE = AdcConfiguration().sample_rate  # values/s
 VALUES_PER_FRAME = 3
-QUEUE = 100_000  # messages; the subscriber must not be what loses some
-MATCH_TIME = 20.0  # s until publisher and subscriber must have found each other
-SETTLE_TIME = 0.5  # s more, for the other direction, and for the CAN bus
 SILENCE = 3.0  # s without a message after which no more is awaited
 ATTEMPTS = 3  # for a stream that must not lose anything; the machine may have been busy
 MAX_LATENESS = 0.25  # s; a node that cannot follow is later and later
-PAUSE = 0.001  # s between two looks at the queue
+LAST_BATCH = 0.5  # s for which a node waits until it gives up an incomplete period
+MULTIPLES = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16)
+SENSORS = 20  # whose rates together one core must follow in batches
 UNIT = "µs CPU per sample"
-
-
-@dataclass(frozen=True)
-class Program:
-    """A node that publishes what it receives on the CAN bus.
-
-    Attributes:
-        module: What Python runs.
-        node: Name of the node.
-        parameters: Its parameters; {port} is the one of the server.
-        start: What the server is told to begin.
-    """
-
-    module: str
-    node: str
-    parameters: tuple[str, ...] = ("port:={port}",)
-    start: str = "stream"
-
-
-OURS = Program(
-    "icotronic_driver.node:main", "icotronic",
-    ("can_interface:=socketcand", "can_options:=[host=127.0.0.1, port={port}]",
-     "sensor_name:=Bench", "sample_rate:={rate}"), "find")
-IDIOMATIC = Program("bench.idiomatic_node", "idiomatic")
-BARE = Program("bench.bare_loop", "bare")
 
 
 class Run(NamedTuple):
@@ -78,139 +53,125 @@ class Run(NamedTuple):
     lateness: float
 
 
-class Subscriber:
-    """Subscribes to the programs, one after the other."""
-
-    _numbers = itertools.count()
-
-    def __init__(self, node: Node, core: int | None) -> None:
-        """Take a node of this process, and the core for the measured programs."""
-        self._node = node
-        self._core = core
-
-    def run(self, program: Program, frames: int, rate: float = SENSOR_RATE) -> Run:
-        """Have a program publish a stream, and return what came of it.
-
-        Args:
-            program: What to run.
-            frames: CAN frames of the stream.
-            rate: Values/s of the stream.
-        """
-        samples = frames * VALUES_PER_FRAME
-        namespace = f"bench_{next(self._numbers)}"
-        with Process("bench.server", "--frames", frames, "--rate", rate) as server:
-            values = {"port": server.line(), "rate": rate, "namespace": namespace}
-            arguments = ["--ros-args", "-r", f"__ns:=/{namespace}"]
-            for parameter in program.parameters:
-                arguments += ["-p", parameter.format_map(values)]
-            with (self._subscription(f"/{namespace}/{program.node}/imu/data_raw") as subscription,
-                  Process(program.module, *arguments, core=self._core) as process):
-                self._await_publisher(subscription, process)
-                server.tell(program.start)
-                received, cost = self._receive(subscription, process, samples)
-                ended = time.monotonic()
-                return Run(samples, received, cost, ended - float(server.line()))
-
-    @staticmethod
-    def _await_publisher(subscription: Subscription, process: Process) -> None:
-        end = time.monotonic() + MATCH_TIME
-        while not subscription.get_publisher_count():
-            if time.monotonic() > end or not process.is_running():
-                raise process.failure("did not come up")
-            time.sleep(0.05)
-        time.sleep(SETTLE_TIME)
-
-    @staticmethod
-    def _receive(subscription: Subscription, process: Process,
-                 samples: int) -> tuple[int, float]:
-        """Return how many samples came, and the CPU time in µs for each behind the first tenth."""
-        first = samples // 10
-        count = seen = 0
-        start = 0.0
-        end = time.monotonic() + MATCH_TIME
-        take = subscription.handle.take_message
-        with subscription.handle:
-            while count < samples:
-                if take(Imu, True) is not None:
-                    count += 1
-                    if count == first:
-                        start = process.cpu_time()
-                    continue
-                now = time.monotonic()
-                if count > seen:
-                    seen, end = count, now + SILENCE
-                elif now > end or not process.is_running():
-                    break
-                time.sleep(PAUSE)
-        if count <= first:
-            raise process.failure(f"published {count} of {samples} samples")
-        return count, (process.cpu_time() - start) / (count - first) * 1e6
-
-    @contextmanager
-    def _subscription(self, topic: str) -> Iterator[Subscription]:
-        subscription = self._node.create_subscription(Imu, topic, lambda _: None,
-                                                      QoSProfile(depth=QUEUE), raw=True)
-        yield subscription
-        self._node.destroy_subscription(subscription)
-
-
 @contextmanager
-def make_subscriber(core: int | None) -> Iterator[Subscriber]:
-    """Yield the subscriber of this process; `core` is for the programs."""
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    try:
-        yield Subscriber(rclpy.create_node("bench"), core)
-    finally:
-        rclpy.try_shutdown()
+def streaming(receiver: Receiver, program: Program, frames: int,
+              rate: float = SENSOR_RATE) -> Iterator[tuple[Running, Process]]:
+    """Run a program and the server of its CAN bus, which awaits the word to begin."""
+    with Process("bench.server", "--frames", frames, "--rate", rate) as server:
+        values = {"port": server.line(), "rate": rate}
+        with receiver.running(program, values) as running:
+            running.await_publishers()
+            yield running, server
 
 
-def compare(subscriber: Subscriber, frames: int, rounds: int) -> list[Row]:
+def run(receiver: Receiver, program: Program, frames: int, rate: float = SENSOR_RATE) -> Run:
+    """Have a program publish a stream, and return what came of it.
+
+    Args:
+        receiver: Runs and receives.
+        program: What to run.
+        frames: CAN frames of the stream.
+        rate: Values/s of the stream.
+    """
+    samples = frames * VALUES_PER_FRAME
+    with streaming(receiver, program, frames, rate) as (running, server):
+        server.tell(program.start)
+        received, cost = _receive(running, samples, batches=program is BATCHES)
+        ended = time.monotonic()
+        return Run(samples, received, cost, ended - float(server.line()))
+
+
+def _receive(running: Running, samples: int, *, batches: bool) -> tuple[int, float]:
+    """Return how many samples came, and the CPU time in µs for each behind the first tenth."""
+    first = samples // 10
+    count = seen = at_mark = 0
+    start = 0.0
+    end = time.monotonic() + MATCH_TIME
+    while count < samples:
+        message = running.take()
+        if message is not None:
+            count += deserialize_message(message, PointCloud2).width if batches else 1
+            if not start and count >= first:
+                start, at_mark = running.process.cpu_time(), count
+            continue
+        now = time.monotonic()
+        if count > seen:
+            seen, end = count, now + SILENCE
+        elif now > end or not running.process.is_running():
+            break
+        time.sleep(PAUSE)
+    if count <= at_mark or not start:
+        raise running.process.failure(f"published {count} of {samples} samples")
+    return count, (running.process.cpu_time() - start) / (count - at_mark) * 1e6
+
+
+def compare(receiver: Receiver, frames: int, rounds: int) -> list[Row]:
     """Return the rows of the comparisons, at the sensor's own rate.
 
     Args:
-        subscriber: Receives what is published.
+        receiver: Runs and receives.
         frames: CAN frames of each run.
         rounds: How often all programs are run.
     """
-    results = list(in_turn({program.node: partial(_cost, subscriber, program, frames)
-                            for program in (OURS, IDIOMATIC, BARE)}, rounds))
+    results = list(in_turn({program.node: partial(_cost, receiver, program, frames)
+                            for program in (SAMPLES, IDIOMATIC, BARE_LOOP)}, rounds))
     ours, idiomatic, bare = ([result[program.node] for result in results]
-                             for program in (OURS, IDIOMATIC, BARE))
-    return [Row.of_costs("can to imu, idiomatic", UNIT, 0.4, ours, idiomatic),
-            Row.of_costs("can to imu, bare loop", UNIT, 1.25, ours, bare)]
+                             for program in (SAMPLES, IDIOMATIC, BARE_LOOP))
+    return [Row.compare("can to imu, idiomatic", UNIT, 0.35, ours, idiomatic),
+            Row.compare("can to imu, bare loop", UNIT, 1.15, ours, bare)]
 
 
-def find_highest_rate(subscriber: Subscriber, multiples: Sequence[int], duration: float) -> Row:
-    """Return the row of the highest rate that our node publishes without a loss.
+def find_highest_rates(receiver: Receiver, multiples: Sequence[int], duration: float,
+                       rounds: int) -> list[Row]:
+    """Return the row of the highest rates that our node and the bare loop publish without a loss.
 
     Args:
-        subscriber: Receives what is published.
+        receiver: Runs and receives.
         multiples: Multiples of the sensor's rate, tried in this order until one does not work.
         duration: Time in s of each stream.
+        rounds: How often.
     """
-    best: tuple[int, Run] | None = None
+    results = list(in_turn({program.node: partial(_highest, receiver, program, multiples, duration)
+                            for program in (SAMPLES, BARE_LOOP)}, rounds))
+    return [Row.compare("highest rate, bare loop", f"× {SENSOR_RATE:.0f} values/s", 0.85,
+                        [result[SAMPLES.node] for result in results],
+                        [result[BARE_LOOP.node] for result in results], at_least=True)]
+
+
+def follow_many(receiver: Receiver, duration: float) -> list[Row]:
+    """Return the row of the batches of many sensors' rates together: what came of what was sent."""
+    rate = nearest_adc_configuration(SENSORS * SENSOR_RATE).sample_rate
+    got = _lossless(receiver, BATCHES, round(duration * rate / VALUES_PER_FRAME), rate)
+    if got is None or got.lateness > MAX_LATENESS + LAST_BATCH:
+        raise Failure(f"batches did not follow {SENSORS} times the sensor's rate")
+    return [Row.compare(f"batches, {SENSORS} sensors' rates", "samples", 1.0,
+                        [Cost(got.received, got.received)], [Cost(got.sent, got.sent)],
+                        at_least=True)]
+
+
+def _highest(receiver: Receiver, program: Program, multiples: Sequence[int],
+             duration: float) -> Cost:
+    best, samples = 0, 0
     for multiple in multiples:
         rate = nearest_adc_configuration(multiple * SENSOR_RATE).sample_rate
-        run = _lossless(subscriber, OURS, round(duration * rate / VALUES_PER_FRAME), rate)
-        if run is None or run.lateness > MAX_LATENESS:
+        got = _lossless(receiver, program, round(duration * rate / VALUES_PER_FRAME), rate)
+        if got is None or got.lateness > MAX_LATENESS:
             break
-        best = multiple, run
-    if best is None:
-        raise Failure(f"something got lost even at {multiples[0]} times the sensor's rate")
-    highest, run = best
-    return Row("highest rate without a loss", highest, 1, f"× {SENSOR_RATE:.0f} values/s", highest,
-               8, highest >= 8, None, (run.received, run.sent), at_least=True)
+        best, samples = multiple, samples + got.received
+    if not best:
+        raise Failure(f"{program.node} lost something at {multiples[0]} times the sensor's rate")
+    return Cost(best, samples)
 
 
-def _cost(subscriber: Subscriber, program: Program, frames: int) -> Cost:
-    run = _lossless(subscriber, program, frames)
-    if run is None:
+def _cost(receiver: Receiver, program: Program, frames: int) -> Cost:
+    got = _lossless(receiver, program, frames)
+    if got is None:
         raise Failure(f"{program.node} lost something in each of {ATTEMPTS} runs")
-    return Cost(run.cost, run.received)
+    return Cost(got.cost, got.received)
 
 
-def _lossless(subscriber: Subscriber, program: Program, frames: int,
+def _lossless(receiver: Receiver, program: Program, frames: int,
               rate: float = SENSOR_RATE) -> Run | None:
     """Return the first run in which nothing got lost; None where that is in all of them."""
-    runs = (subscriber.run(program, frames, rate) for _ in range(ATTEMPTS))
+    runs = (run(receiver, program, frames, rate) for _ in range(ATTEMPTS))
     return next((run for run in runs if run.received == run.sent), None)

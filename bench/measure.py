@@ -13,11 +13,16 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
+
+T = TypeVar("T")
 
 ROOT = Path(__file__).resolve().parent.parent
 PATIENCE = 30.0  # s until a process must have said something
 END_TIME = 5.0  # s in which it must end when it is asked to
+QUIET = 0.05  # share of the processor time that others may use, for a figure to be trusted
+STAT = Path("/proc/stat")
+TICKS = os.sysconf("SC_CLK_TCK")
 
 
 class Failure(Exception):  # noqa: N818
@@ -26,6 +31,9 @@ class Failure(Exception):  # noqa: N818
 
 class Process:
     """A child process; a context manager that ends it.
+
+    Attributes:
+        started: Monotonic time in s at which it was started.
 
     Args:
         module: What Python runs, as "module" or "module:function".
@@ -41,6 +49,7 @@ class Process:
         module, _, function = module.partition(":")
         start = ["-c", f"from {module} import {function}; {function}()"] if function else [
             "-m", module]
+        self.started = time.monotonic()
         self._process = subprocess.Popen(
             [sys.executable, *start, *map(str, arguments)], cwd=ROOT, text=True,
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
@@ -81,6 +90,10 @@ class Process:
             raise self.failure("did not answer")
         return line
 
+    def rest(self) -> list[str]:
+        """Return what else it printed until it ended."""
+        return list(iter(lambda: self._lines.get(timeout=PATIENCE), None))
+
     def failure(self, text: str) -> Failure:
         """Return an exception with what the process complained about."""
         return Failure("\n".join([f"{self._name} {text}", *self._complaints[-15:]]))
@@ -93,6 +106,12 @@ class Process:
         """Return the CPU time in s that all of its threads have used so far."""
         # The CPU-time clock of another process, as clock_getcpuclockid(3) makes it.
         return time.clock_gettime(~self._process.pid << 3 | 2)
+
+    @property
+    def memory(self) -> float:
+        """Memory in MB that it has for itself, and its share of what it has with others."""
+        text = Path(f"/proc/{self._process.pid}/smaps_rollup").read_text()
+        return int(text.split("Pss:")[1].split()[0]) / 1000
 
     def _read(self) -> None:
         for line in self._process.stdout or ():
@@ -117,17 +136,46 @@ def divide_cores() -> int | None:
 
 
 class Cost(NamedTuple):
-    """CPU time in µs per piece, and how many pieces were processed."""
+    """What one side cost: per piece, in the unit of its row, and how many pieces it processed."""
 
     each: float
     pieces: int
 
 
-def in_turn(sides: Mapping[str, Callable[[], Cost]], rounds: int) -> Iterator[dict[str, Cost]]:
+def in_turn(sides: Mapping[str, Callable[[], T]], rounds: int) -> Iterator[dict[str, T]]:
     """Measure all sides once per round, in an order that changes from round to round."""
     for number in range(rounds):
         names = list(sides)[::-1 if number % 2 else 1]
         yield {name: sides[name]() for name in names}
+
+
+class ForeignLoad:
+    """What others did on this machine during a measurement; a context manager.
+
+    Attributes:
+        share: Share of the processor time that others used.
+    """
+
+    share = 0.0
+
+    def __enter__(self) -> ForeignLoad:
+        """Begin."""
+        self._begin = self._times()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End; all processes of the measurement have ended as well."""
+        total, others = (after - before for before, after in
+                         zip(self._begin, self._times(), strict=True))
+        self.share = max(0.0, others / total) if total else 0.0
+
+    @staticmethod
+    def _times() -> tuple[float, float]:
+        """Return processor time of the machine, and of it what others used, in s."""
+        fields = [int(field) / TICKS for field in STAT.read_text().split("\n", 1)[0].split()[1:9]]
+        own = os.times()
+        idle = fields[3] + fields[4]
+        return sum(fields), sum(fields) - idle - sum(own[:4])
 
 
 @dataclass
@@ -136,43 +184,52 @@ class Row:
 
     Attributes:
         name: What was measured.
+        unit: Of both sides.
+        aim: What the figure should be at most, or at least.
         ours: Median of this package.
         other: Median of what it is compared with.
-        unit: Of both.
-        ratio: Median of ours / other within a round.
-        aim: What the ratio should be at most, or at least.
-        met: Whether it is.
-        spread: Smallest and largest ratio.
+        figure: Median of ours / other, or of ours − other, within a round.
+        spread: Smallest and largest of these.
         processed: Pieces that each of the two sides processed in all.
-        at_least: Whether a higher ratio is better.
-        note: What else is to be said.
+        difference: Whether the figure is ours − other.
+        at_least: Whether a higher figure is better.
+        met: Whether the aim is met.
+        foreign: Share of the processor time that other programs used meanwhile.
+        note: Why it was not measured.
     """
 
     name: str
-    ours: float | None
-    other: float | None
     unit: str
-    ratio: float | None
     aim: float
-    met: bool | None
-    spread: tuple[float, float] | None
-    processed: tuple[int, int] | None
+    ours: float | None = None
+    other: float | None = None
+    figure: float | None = None
+    spread: tuple[float, float] | None = None
+    processed: tuple[int, int] | None = None
+    difference: bool = False
     at_least: bool = False
+    met: bool | None = None
+    foreign: float | None = None
     note: str = ""
 
     @classmethod
-    def of_costs(cls, name: str, unit: str, aim: float, ours: Sequence[Cost],
-                 other: Sequence[Cost]) -> Row:
-        """Return the row of a comparison: the lower the ratio, the better."""
-        ratios = [one.each / two.each for one, two in zip(ours, other, strict=True)]
-        ratio = statistics.median(ratios)
-        return cls(name, statistics.median(cost.each for cost in ours),
-                   statistics.median(cost.each for cost in other), unit, ratio, aim, ratio <= aim,
-                   (min(ratios), max(ratios)),
-                   (sum(cost.pieces for cost in ours), sum(cost.pieces for cost in other)))
+    def compare(cls, name: str, unit: str, aim: float, ours: Sequence[Cost],
+                other: Sequence[Cost], *, difference: bool = False,
+                at_least: bool = False) -> Row:
+        """Return the row of a comparison, from what each side cost in each round."""
+        figures = [one.each - two.each if difference else one.each / two.each
+                   for one, two in zip(ours, other, strict=True)]
+        figure = statistics.median(figures)
+        return cls(name, unit, aim, statistics.median(cost.each for cost in ours),
+                   statistics.median(cost.each for cost in other), figure,
+                   (min(figures), max(figures)),
+                   (sum(cost.pieces for cost in ours), sum(cost.pieces for cost in other)),
+                   difference, at_least, figure >= aim if at_least else figure <= aim)
 
-    @classmethod
-    def not_measured(cls, name: str, unit: str, aim: float, reason: str) -> Row:
-        """Return a row without a result."""
-        return cls(name, None, None, unit, None, aim, None, None, None,
-                   note=f"not measured: {reason}")
+    @property
+    def verdict(self) -> str:
+        """Whether the aim is met, as far as the machine lets that be said."""
+        if self.met is None:
+            return f"not measured: {self.note}"
+        busy = self.foreign is not None and self.foreign > QUIET
+        return ("yes" if self.met else "no") + f" (busy: {self.foreign:.0%} by others)" * busy
