@@ -126,9 +126,11 @@ def _nearest(message: Any, places: Array) -> Array:
     return points[distances.argmin(axis=1)].astype(float)
 
 
-VIBRATION_TIMING = 0.0002  # s by which single samples may be off, beside a common delay
+VIBRATION_TIMING = 0.0002  # s by which single samples may be off, beside a common delay …
+SETTLING, SETTLING_TIMING = 3.0, 0.0005  # … and in the first seconds so much more
 DELAY_STEP, GRID = VIBRATION_TIMING / 4, 1_000_000  # s, and how many of them at most
 PIECE = 1000  # samples that are shifted together
+CLOCK_LATEST = 10.0  # as LATEST: a clock suffers from the worst turns of its last seconds
 
 
 def vibration_in_x(times: Array) -> Array:
@@ -140,8 +142,8 @@ def compare_vibration(messages: Sequence[Any], machine: Machine) -> Comparison:
     """Compare accelerations in x with the simulator's vibration, but for a delay they share.
 
     The radio and the bus delay all samples alike, which nothing in the data can show; the delay
-    is fitted. Where the machine was so late that the stamps cannot be that good, pieces of the
-    stream may be shifted by as much as it was late; their values must fit as well as elsewhere.
+    is fitted. Where the stamps cannot be that good, because the stream has just begun or the
+    machine was late, pieces of the stream may be shifted; their values must fit as well.
     """
     times = np.array([seconds_of(message) for message in messages])
     measured = np.array([message.linear_acceleration.x for message in messages])
@@ -149,10 +151,11 @@ def compare_vibration(messages: Sequence[Any], machine: Machine) -> Comparison:
     part = slice(0, len(times), max(1, len(times) // 5000))
     delay = best_delay(times[part], measured[part], TIMING)
     delays = np.full_like(times, delay)
-    for start in range(0, len(times), PIECE):
-        piece = slice(start, start + PIECE)
-        if late[piece].max() > VIBRATION_TIMING:
-            delays[piece] += best_delay(times[piece] - delay, measured[piece], late[piece].max())
+    reach = CLOCK_LATEST * late + np.where(times < times[0] + SETTLING, SETTLING_TIMING, 0.0)
+    gaps = np.flatnonzero(np.abs(np.diff(times) * AdcConfiguration().sample_rate - 1.0) > 0.1) + 1
+    for piece in np.split(np.arange(len(times)), np.union1d(gaps, np.arange(0, len(times), PIECE))):
+        if piece.size:
+            delays[piece] += best_delay(times[piece] - delay, measured[piece], reach[piece].max())
     true_times = times - delays
     true = vibration_in_x(true_times)
     step = VIBRATION_TIMING / 2
