@@ -27,7 +27,7 @@ from uc4000_driver.telegram import GAP
 
 LATENCIES = (0.008, ADAPTER_LATENCY)  # s, see Group
 RECENT = 20  # sets by which a group is judged
-CALM = 500  # sets without a failure after which a group tries again whether it can be quicker
+CALM = 100  # sets without a failure after which a group tries again whether it can be quicker
 NOTEWORTHY = 0.1  # share of failing sets
 OPERATING_TEMPERATURE = (-25, 70)  # °C, section 2.1
 
@@ -103,15 +103,20 @@ class Group:
         gain = (1 - 1 / count) * (1 - stagger(self.latency) / alone)
         if self.failing < gain / 2:
             return False
-        more = [latency for latency in LATENCIES
-                if latency > self.latency and most_together(cycles, latency) > 1]
-        if more:
-            self._try(more[0])
-            return False
         self._paused_until = time.monotonic() + self._backoff.pause()
         return True
 
+    def note_lateness(self, lateness: float) -> bool:
+        """Take note how late a member was alone; return whether it can measure with others."""
+        for latency in LATENCIES:
+            if lateness <= stagger(latency) - GAP:
+                if latency > self.latency:
+                    self._try(latency)
+                return True
+        return False
+
     def _try(self, latency: float) -> None:
+        """Leave replies another time; what failed before says nothing about that."""
         self.latency = latency
         self._recent.extend([False] * RECENT)
         self._calm = 0
@@ -239,7 +244,7 @@ class Acquisition:
         profile, cycles = sensor.profile, sensor.options.cycles
         answer = Access(self._line, sensor).ask(commands.measure(profile, cycles), attempts=1)
         if group is not None:
-            sensor.is_punctual = answer.lateness <= stagger(LATENCIES[-1]) - GAP
+            sensor.is_punctual = group.note_lateness(answer.lateness)
         self._report(sensor, answer, profile, cycles)
 
     def _measure_together(self, sensors: Sequence[Sensor], group: Group) -> None:

@@ -124,3 +124,12 @@ def test_rviz_shows_the_points_of_the_radar():
     assert cloud["Topic"]["Value"] == "/isys_radar/points"
     assert cloud["Channel Name"] == "radial_velocity"
     assert manager["Global Options"]["Fixed Frame"] == "isys_radar_link"
+
+
+@pytest.mark.parametrize("path", [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))],
+                         ids=lambda path: path.name)
+def test_every_table_has_a_head(path):
+    lines = ["", *path.read_text().splitlines(), ""]
+    for before, line, after in zip(lines, lines[1:], lines[2:], strict=False):
+        if line.startswith("|") and not before.startswith("|"):
+            assert after.startswith("| ---"), f"{line} stands below an empty line"

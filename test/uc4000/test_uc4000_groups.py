@@ -154,40 +154,36 @@ def test_an_adapter_with_a_latency_timer_lets_fewer_measure_together(connect):
         assert measurement.distance.value == still(int(name[1]) - 1)
 
 
-def failures_until_a_change(count, latency):
-    """Return how many of twenty sets may fail until a group of so many sensors is changed."""
+def failures_until_a_pause(count, latency):
+    """Return how many of twenty sets may fail until a group of so many sensors takes a pause."""
     group = Group(frozenset())
     group.latency = latency
-    failures = 0
-    while group.latency == latency and not group.is_paused:
-        group.note_failure(count, cycles=1)
+    failures = 1
+    while not group.note_failure(count, cycles=1):
         failures += 1
+    assert group.is_paused
+    assert group.is_failing
+    assert group.failing == failures / 20
+    assert group.sets == group.failures == failures
     return failures
 
 
 def test_a_group_measures_together_only_while_that_is_quicker():
-    assert [failures_until_a_change(count, 0.008) for count in (3, 2)] == [5, 4]
-    assert failures_until_a_change(2, ADAPTER_LATENCY) == 3
-    group = Group(frozenset())
-    fails = [group.note_failure(3, cycles=1) for _ in range(5)]
-    assert (fails, group.latency) == ([False] * 5, ADAPTER_LATENCY)  # first with more patience
-    fails = [group.note_failure(2, cycles=1) for _ in range(3)]
-    assert fails == [False, False, True]
-    assert group.is_paused
-    assert group.is_failing
-    assert group.failing == 0.15
-    assert (group.sets, group.failures) == (8, 8)
+    assert [failures_until_a_pause(count, 0.008) for count in (3, 2)] == [5, 4]
+    assert failures_until_a_pause(2, ADAPTER_LATENCY) == 3
 
 
-def test_a_group_that_works_with_patience_tries_whether_it_works_without():
+def test_a_group_has_as_much_patience_as_its_members_need():
     group = Group(frozenset())
-    for _ in range(5):
-        group.note_failure(3, cycles=1)
+    assert group.note_lateness(0.019)  # 10 ms by the manual, 1 ms of transmission, 8 ms
+    assert group.latency == 0.008
+    assert group.note_lateness(0.020)
+    assert group.latency == ADAPTER_LATENCY
+    assert not group.note_lateness(0.032)
     for _ in range(CALM):
         assert group.latency == ADAPTER_LATENCY
         group.note_success()
-    assert group.latency == 0.008
-    assert not group.is_failing
+    assert group.latency == 0.008  # perhaps it was only once
 
 
 def test_a_group_that_always_fails_is_told(connect):

@@ -7,6 +7,7 @@ node published can be compared.
 from __future__ import annotations
 
 import math
+import re
 import statistics
 import time
 
@@ -18,7 +19,7 @@ from sensor_msgs.msg import Range, Temperature
 
 from uc4000_driver.commands import OpCode
 from uc4000_driver.simulator.line import simulated_line
-from uc4000_driver.telegram import ErrorCode
+from uc4000_driver.telegram import ErrorCode, Reply
 
 UC4000 = "uc4000_driver.node"
 DISTANCES = {"left": 1.6, "right": 2.4}
@@ -385,6 +386,28 @@ def test_diagnostics_of_a_sensor_that_is_silent(simulated, uc4000, heard, ros):
     ros.wait_for_status("uc4000: right", lambda status: status.level != ERROR)
 
 
+def test_diagnostics_of_a_group_that_fails(simulated, uc4000, heard, ros):
+    assert uc4000.set("right.rate", 0.0).successful
+    right, reply = simulated["right"], simulated["right"].reply
+
+    def refuse(request, now):  # only where the left one measures as well
+        if request.op_code == OpCode.PROFILE_A and request.address == right.address and any(
+                end > now for _, end in simulated["left"].measurements[-1:]):
+            return now, Reply(bytes([ErrorCode.SESSION_ERROR]), acknowledged=False)
+        return reply(request, now)
+
+    right.reply = refuse
+    status = ros.wait_for_status("uc4000: left", lambda status: status.level == WARN)
+    share = float(status.values["failed lately [%]"])
+    assert status.message == (f"{share:.0f}% of the measurements together with its group fail"
+                              + ", so they measure one by one" * ("one by one" in status.message))
+    assert int(status.values["failed measurements of its group"]) >= 2
+    heard.several("left/range", 3)
+    right.reply = reply
+    assert uc4000.set("right.rate", 5.0).successful
+    ros.wait_for_status("uc4000: left", lambda status: status.level == OK)
+
+
 def test_a_new_rate_counts_at_once(simulated, uc4000, heard):
     assert uc4000.set("right.rate", 0.02).successful  # a measurement in 50 s
     heard.next("right/range")
@@ -450,6 +473,27 @@ def test_a_simulated_sensor_inside_the_node_and_a_typing_error(ros, tmp_path):
                               '"gain_db"?')
         assert Heard(ros, "/tank").next().header.frame_id == "tank_link"
         process.stop()
+
+
+def test_users_are_answered_within_a_long_measurement(ros, tmp_path):
+    line, (simulated,) = simulated_line(link=str(tmp_path / "port"))
+    line.start()
+    tank = ros.remote("/tank")
+    parameters = {"serial_port": str(tmp_path / "port"), "cycles": 255}
+    with NodeProcess(UC4000, parameters, "-r", "__node:=tank") as process:
+        ros.wait_for_status("tank: sensor", lambda status: status.level == OK)
+        ros.wait_until(lambda: simulated.measurements)
+        reason = tank.set("gain_db", 60.0).reason
+        assert re.fullmatch(r"the line is in use for up to \d+\.\d s more \(address 7: measure\); "
+                            "try again then, or set cycles to less", reason)
+        assert "the line is in use for up to " in tank.trigger("identify").message
+        assert tank.set("cycles", 1).successful  # for the next one
+        ros.wait_for_status("tank: sensor", lambda status: status.level == OK)
+        tank.change_state("deactivate")
+        (_, end), = simulated.measurements
+        assert time.monotonic() < end  # all that took less time than the measurement
+        process.stop()
+    line.close()
 
 
 def test_an_end_within_a_long_measurement(tmp_path):
