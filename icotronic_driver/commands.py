@@ -53,6 +53,7 @@ BLUETOOTH = (SYSTEM, 0x0B)  # block and command; a sub-command follows
 SELF = 0xFF  # device number: the node itself, not one that it sees
 NAME_LENGTH, FIRST_PART = 8, 6  # bytes of a name, and how many the first frame carries
 EEPROM_CHUNK = 4  # errata C10
+LED_NUMBER = 1  # field note N6
 ADVERTISEMENT_STEP = 0.625e-3  # s
 TEMPERATURE_REFERENCE = 1.25  # V; with it the temperature comes in m°C
 
@@ -378,11 +379,11 @@ def _celsius(data: bytes) -> float:
     return int.from_bytes(_bytes(data)[4:], "little", signed=True) / 1000
 
 
-def _read_led(number: int = 0) -> bytes:
+def _read_led(number: int = LED_NUMBER) -> bytes:
     return bytes((0x01, number)) + bytes(6)
 
 
-def _write_led(on: bool, number: int = 0) -> bytes:
+def _write_led(on: bool, number: int = LED_NUMBER) -> bytes:
     return bytes((0x81, number, 1 if on else 2)) + bytes(5)
 
 

@@ -128,6 +128,7 @@ class IcotronicNode(DeviceNode, Listener):
         self._topics: dict[str, Any] = {}
         self._stream = Stream((), 1, 0)
         self._told_queues: set[str] = set()
+        self._told_load = ""
         self._history: deque[_Counts] = deque()
         super().__init__("icotronic")
 
@@ -212,8 +213,9 @@ class IcotronicNode(DeviceNode, Listener):
         """Show the sensor's settings as parameters; say what its stream does to the bus."""
         super().on_found(sensor)
         warning = sensor.load_warning(self.option("can_bitrate"))
-        if warning:
+        if warning and warning != self._told_load:
             self.on_note(sensor, warning, warning=True)
+        self._told_load = warning
 
     def on_stream(self, sensor: Sensor) -> Callable[[int, float, tuple[int, ...]], None]:
         """Return what publishes the samples of a stream that begins: the hot path."""
@@ -406,19 +408,22 @@ class IcotronicNode(DeviceNode, Listener):
             f"no plausible calibration of channel {', '.join(guessed)}; it is a guess by "
             "acceleration_range_g": guessed,
             **dict.fromkeys(sensor.readings.faults, True),
-            sensor.load_warning(self.option("can_bitrate")): True}
+            sensor.load_warning(self.option("can_bitrate")):
+                recent.foreign or sensor.overloads(self.option("can_bitrate"))}
         return [text for text, is_so in found.items() if text and is_so]
 
     def _recent_counts(self, sensor: Sensor) -> _Counts:
         """Return what was counted in the last `RECENT_TIME` s."""
         counts, line = sensor.statistics, self.bus.line.counts
-        now = _Counts(time.monotonic(), counts.frames, counts.lost, line.other_host, line.errors)
+        now = _Counts(time.monotonic(), counts.frames, counts.lost, line.foreign, line.other_host,
+                      line.errors)
         self._history.append(now)
         while now.time - self._history[0].time > RECENT_TIME:
             self._history.popleft()
         first = self._history[0]
         return _Counts(now.time - first.time, now.frames - first.frames, now.lost - first.lost,
-                       now.other_host - first.other_host, now.errors - first.errors)
+                       now.foreign - first.foreign, now.other_host - first.other_host,
+                       now.errors - first.errors)
 
 
 class _Counts(NamedTuple):
@@ -427,6 +432,7 @@ class _Counts(NamedTuple):
     time: float
     frames: int
     lost: int
+    foreign: int
     other_host: int
     errors: int
 

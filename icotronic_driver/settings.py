@@ -32,7 +32,8 @@ from icotronic_driver.values import (
     encode_text,
 )
 
-LED_NUMBER = 0
+RATE_TOLERANCE = 0.005  # by which a sample rate may differ from the wanted one for less noise
+RECOMMENDED_PRESCALERS = PRESCALERS[1:]  # the vendor's tool offers no 1 (field note N8)
 
 
 @dataclass(frozen=True)
@@ -85,8 +86,8 @@ LOWEST_ENERGY = IcotronicRecord(layout=("I", "H"), byte_order="<", parts=(
     Part(commands.READ_LOWEST_ENERGY, commands.WRITE_LOWEST_ENERGY, bytes((15, SELF)),
          bytes((16, SELF)), 6),))
 LED = IcotronicRecord(layout=("B",), parts=(
-    Part(commands.READ_LED, commands.WRITE_LED, bytes((0x01, LED_NUMBER)),
-         bytes((0x81, LED_NUMBER)), 1),))
+    Part(commands.READ_LED, commands.WRITE_LED, bytes((0x01, commands.LED_NUMBER)),
+         bytes((0x81, commands.LED_NUMBER)), 1),))
 
 
 def _calibration(element: CalibrationElement, axis: int, *, slope: bool) -> IcotronicRecord:
@@ -151,15 +152,20 @@ SETTINGS: Mapping[str, Setting] = {setting.name: setting for setting in ROWS}
 
 def nearest_adc_configuration(sample_rate: float,
                               reference_voltage: float = 3.3) -> AdcConfiguration:
-    """Return the ADC configuration whose sample rate in values/s is nearest to the wanted one.
+    """Return the ADC configuration for a wanted sample rate in values/s.
 
-    Of several with that rate it is the one with the most oversampling, because that has the least
-    noise, and then the one whose acquisition time is nearest to that after a reset.
+    Of those that come near enough it is the one with the most oversampling, because that has the
+    least noise; else the nearest. Where several are equal, the ADC's clock is the fastest, which
+    leaves most time to take the signal (field note N8).
     """
-    reset = AdcConfiguration()
-    candidates = (AdcConfiguration(prescaler, acquisition, oversampling, reference_voltage)
-                  for oversampling in reversed(OVERSAMPLING_RATES)
-                  for acquisition in ACQUISITION_TIMES for prescaler in PRESCALERS)
-    return min(candidates, key=lambda candidate: (
-        abs(candidate.sample_rate - sample_rate), -candidate.oversampling_rate,
-        abs(candidate.acquisition_time - reset.acquisition_time)))
+    candidates = [AdcConfiguration(prescaler, acquisition, oversampling, reference_voltage)
+                  for oversampling in OVERSAMPLING_RATES
+                  for acquisition in ACQUISITION_TIMES for prescaler in RECOMMENDED_PRESCALERS]
+
+    def deviation(candidate: AdcConfiguration) -> float:
+        return abs(candidate.sample_rate - sample_rate)
+
+    near = [one for one in candidates if deviation(one) <= RATE_TOLERANCE * sample_rate]
+    most = max((one.oversampling_rate for one in near), default=0)
+    return min([one for one in near if one.oversampling_rate == most] or candidates,
+               key=lambda one: (deviation(one), -one.oversampling_rate, one.prescaler))

@@ -423,8 +423,9 @@ def decode_single(format: StreamFormat, data: bytes | bytearray) -> tuple[int, .
     Raises:
         FrameError: Format or length is not the one that was asked for.
     """
-    decoder = StreamDecoder(format)
-    values = decoder.decode_frame(0.0, data)
+    padded = len(data) == MAX_PAYLOAD > format.frame_length  # field note N9
+    values = StreamDecoder(format).decode_frame(
+        0.0, data[:format.frame_length] if padded else data)
     if values is None:
         raise FrameError(f"answer to a {format} does not fit: {data.hex(' ').upper() or 'empty'}")
     return values

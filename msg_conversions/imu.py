@@ -48,6 +48,8 @@ def variances_of(axes: Iterable[int], stddev: float) -> list[float]:
         axes: Those that are measured: 0 = x, 1 = y, 2 = z.
         stddev: Their standard deviation in m/s²; 0 = unknown.
     """
+    if not stddev:
+        return [0.0] * 3  # consumers take a single 0 for perfectly known, but zeros for unknown
     variances = [UNKNOWN_VARIANCE] * 3
     for axis in axes:
         variances[axis] = stddev ** 2

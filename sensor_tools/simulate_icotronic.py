@@ -60,6 +60,7 @@ def open_simulation(options: argparse.Namespace) -> Simulation:
     names = ", ".join(f"{sensor.name} ({sensor.mac})" for sensor in network.sensors)
     return Simulation(
         f"{server.host}:{server.port}: {names}",
-        {"silent": switch([network.faults], "silent"), "silent-on": network.stay_silent,
+        {"silent": switch([network.faults], "silent"),
+         "padding": switch([network.faults], "padding"), "silent-on": network.stay_silent,
          "away": away, "back": back, "power-cycle": power_cycle,
          **fault_commands(network.faults, FAULTS)}, server.close)

@@ -16,7 +16,15 @@ from collections.abc import Iterator, Sequence
 
 from driver_common.errors import DriverError, FrameError, WrongDeviceError
 from driver_common.simulator.bus import CanFrame, SimulatedBus
-from icotronic_driver.identifier import BROADCAST, BROADCAST_SILENT, STH_1, STU_1, Identifier
+from icotronic_driver.commands import STREAMING
+from icotronic_driver.identifier import (
+    BROADCAST,
+    BROADCAST_SILENT,
+    MAX_PAYLOAD,
+    STH_1,
+    STU_1,
+    Identifier,
+)
 from icotronic_driver.simulator.sth import FIRST_MAC, SimulatedSth
 from icotronic_driver.simulator.stu import Faults, SimulatedStu
 from icotronic_driver.simulator.unit import SimulatedNode
@@ -133,6 +141,8 @@ class SimulatedNetwork:
             if self.faults.random.random() < self.faults.answer_loss:
                 return
         error, data = answer
+        if self.faults.padding and request.block == STREAMING:
+            data = data.ljust(MAX_PAYLOAD, b"\0")
         identifier = Identifier(request.block, request.block_command, node.number,
                                 request.sender, request=False, error=error)
         self.send(CanFrame(identifier.encode(), data), now + delay)

@@ -10,7 +10,7 @@ import time
 import numpy as np
 import numpy.typing as npt
 
-from icotronic_driver.commands import CONFIGURATION, STREAMING, TEMPERATURE_REFERENCE
+from icotronic_driver.commands import CONFIGURATION, LED_NUMBER, STREAMING, TEMPERATURE_REFERENCE
 from icotronic_driver.eeprom import CALIBRATION, STH_EEPROM
 from icotronic_driver.identifier import MAX_PAYLOAD, MAX_PAYLOAD_FD, STH_1, Identifier
 from icotronic_driver.simulator.scene import Times, Vibration, vibration
@@ -258,7 +258,7 @@ class SimulatedSth(SimulatedNode):
         return struct.pack("<I", min(0xFFFF, max(0, round(voltage / reference * 0xFFFF))))
 
     def _led_command(self, payload: bytes, now: float) -> bytes:
-        if payload[0] & 0x7F != 1 or payload[1] != 0:
+        if payload[0] & 0x7F != 1 or payload[1] != LED_NUMBER:
             raise Refusal(NOT_AVAILABLE)
         if payload[0] & 0x80:
             if payload[2] not in (1, 2):

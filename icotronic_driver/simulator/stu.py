@@ -35,6 +35,7 @@ class Faults:
         newness: Time in s in which a sensor that was just found tells neither its MAC address nor
             its RSSI nor all of its name (field note N3).
         foreign: Frames per s on the bus that belong to something else.
+        padding: Whether answers to requests for single values have 8 bytes (field note N9).
         silent: Whether nothing gets through.
     """
 
@@ -48,6 +49,7 @@ class Faults:
     connect_time: float = 0.0
     newness: float = 0.0
     foreign: float = 0.0
+    padding: bool = False
     silent: bool = False
     random: random.Random = field(default_factory=lambda: random.Random(1))
 

@@ -197,10 +197,10 @@ CONFIGURATION = [  # ADC: prescaler, acquisition time, oversampling rate, refere
             0xA188_04F, "E0 01 01 19 5F 5D 00 00", 23.903),
     Example("10.5.5", "READ_TEMPERATURE", STH, (), 0xA18A_3C1, "E0 01 01 19 00 00 00 00",
             0xA188_04F, "E0 01 01 19 0C FE FF FF", -0.5),
-    Example("10.5.6", "READ_LED", STH, (), 0xA302_3C1, "01 00 00 00 00 00 00 00",
-            0xA300_04F, "01 00 01 00 00 00 00 00", True),
-    Example("10.5.6", "WRITE_LED", STH, (False,), 0xA302_3C1, "81 00 02 00 00 00 00 00",
-            0xA300_04F, "81 00 02 00 00 00 00 00", False),
+    Example("10.5.6", "READ_LED", STH, (), 0xA302_3C1, "01 01 00 00 00 00 00 00",
+            0xA300_04F, "01 01 01 00 00 00 00 00", True),
+    Example("10.5.6", "WRITE_LED", STH, (False,), 0xA302_3C1, "81 01 02 00 00 00 00 00",
+            0xA300_04F, "81 01 02 00 00 00 00 00", False),
     Example("10.5.6", "WRITE_LED", STH, (True, 7), 0xA302_3C1, "81 07 01 00 00 00 00 00",
             0xA300_04F, "81 07 01 00 00 00 00 00", True),
 ]
@@ -322,7 +322,7 @@ SETTINGS = [
                    [("0F FF 00 00 00 00 00 00", "0F FF 00 14 73 0F A0 0F",
                      "10 FF 00 14 73 0F A0 0F")], 0x002E),
     SettingExample({"led": "disabled"}, [
-        ("01 00 00 00 00 00 00 00", "01 00 02 00 00 00 00 00", "81 00 02 00 00 00 00 00")],
+        ("01 01 00 00 00 00 00 00", "01 01 02 00 00 00 00 00", "81 01 02 00 00 00 00 00")],
         0xA302),
 ]
 

@@ -184,12 +184,33 @@ def test_sample_rate(configuration: AdcConfiguration, rate: float) -> None:  # 1
     assert configuration.sample_rate == pytest.approx(rate, abs=0.05)
 
 
+@pytest.mark.parametrize("recommended", [  # field note N8
+    (9524, 2, 8, 64), (9375, 3, 3, 64), (8889, 2, 32, 32), (6897, 2, 16, 64), (4762, 2, 8, 128),
+    (3448, 2, 16, 128), (2381, 2, 8, 256), (1724, 2, 16, 256), (1190, 2, 8, 512),
+    (862, 2, 16, 512), (595, 2, 8, 1024), (431, 2, 16, 1024), (298, 2, 8, 2048),
+    (216, 2, 16, 2048), (149, 2, 8, 4096), (108, 2, 16, 4096)])
+def test_recommended_rates_give_the_recommended_settings(recommended: tuple[int, ...]) -> None:
+    rate, *settings = recommended
+    assert nearest_adc_configuration(rate) == AdcConfiguration(*settings)
+
+
+@pytest.mark.parametrize("rate", [100.0, 500.0, 1000.0, 2500.0, 5000.0, 12345.0])
+def test_of_the_settings_near_a_rate_the_one_with_the_least_noise_is_taken(rate: float) -> None:
+    found = nearest_adc_configuration(rate)
+    assert found.prescaler > 1
+    assert found.sample_rate == pytest.approx(rate, rel=0.005)
+    more = 2 * found.oversampling_rate
+    assert more > 4096 or not any(
+        AdcConfiguration(prescaler, acquisition, more).sample_rate
+        == pytest.approx(rate, rel=0.005)
+        for prescaler in range(2, 128) for acquisition in (1, 2, 3, 4, 8, 16, 32, 64, 128, 256))
+
+
 def test_nearest_adc_configuration() -> None:
-    assert nearest_adc_configuration(9524) == AdcConfiguration()
-    assert nearest_adc_configuration(1000).sample_rate == 1000
+    assert nearest_adc_configuration(1000).sample_rate == pytest.approx(1000, rel=0.005)
     assert nearest_adc_configuration(1000, 1.8).reference_voltage == 1.8
     assert nearest_adc_configuration(0) == AdcConfiguration(127, 256, 4096)
-    assert nearest_adc_configuration(1e9) == AdcConfiguration(1, 1, 1)
+    assert nearest_adc_configuration(1e9) == AdcConfiguration(2, 1, 1)
     for rate in (50.0, 440.0, 5000.0, 12345.0, 40000.0):
         assert nearest_adc_configuration(rate).sample_rate == pytest.approx(rate, rel=0.01)
 

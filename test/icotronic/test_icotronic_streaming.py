@@ -247,6 +247,11 @@ def test_what_belongs_to_no_stream() -> None:
     assert decoder.statistics.lost == 0
 
 
+@pytest.mark.parametrize("data", ["21 07 34 12", "21 07 34 12 00 00 00 00"])
+def test_a_single_answer_may_be_padded(data: str) -> None:  # field note N9
+    assert decode_single(StreamFormat(X, 1, stream=False), bytes.fromhex(data)) == (0x1234,)
+
+
 def test_a_single_answer_of_another_format_is_refused() -> None:
     with pytest.raises(FrameError, match="single request of x"):
         decode_single(StreamFormat(X, 1, stream=False), b"\xa2\x00\x34\x12")
