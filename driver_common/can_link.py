@@ -7,12 +7,14 @@ import logging
 import os
 import re
 import socket
+import time
 from collections.abc import Sequence
 
 import can
 
 from driver_common.advice import CAN_ERRORS, NO_ACKNOWLEDGE
 from driver_common.errors import LinkError, SettingError
+from driver_common.flight_recorder import ERROR, EXTENDED, REMOTE, FlightRecorder, Kind
 from driver_common.settings import suggestion
 
 CONNECT_TIMEOUT = 2.0  # s
@@ -26,7 +28,7 @@ class CanLink:
     """A CAN bus.
 
     Attributes:
-        receive: Returns the next frame, or None after a time in s; raises what python-can does.
+        arrived: Monotonic time in ns when `receive` returned last.
         receive_buffer: Bytes that the kernel keeps for us, 0 while that is not known.
 
     Args:
@@ -36,6 +38,7 @@ class CanLink:
         options: Further options of the interface, each "name=value".
         filters: Identifier and mask of the extended frames that are wanted; given to the kernel
             where it can filter. Frames that pass must still be looked at.
+        recorder: Gets all that passes.
 
     Raises:
         LinkError: From every method, with what is wrong and what to do.
@@ -43,7 +46,8 @@ class CanLink:
     """
 
     def __init__(self, interface: str, channel: str, bitrate: int, options: Sequence[str],
-                 filters: Sequence[tuple[int, int]]) -> None:
+                 filters: Sequence[tuple[int, int]],
+                 recorder: FlightRecorder | None = None) -> None:
         """Open the bus; returns or raises within a few seconds."""
         logging.getLogger("can").setLevel(logging.CRITICAL)  # its warnings come per frame
         self.interface, self.channel, self._bitrate = interface, channel, bitrate
@@ -59,16 +63,35 @@ class CanLink:
         except (can.CanError, OSError, ImportError, NotImplementedError, ValueError, TypeError,
                 AssertionError) as error:
             raise LinkError(f"cannot open {self}: {self._reason(error)}") from error
-        self.receive = self._bus.recv
+        self.arrived = 0
         self.receive_buffer = 0
         self._prepare_socket()
+        self._receive = self._bus.recv
+        self._recorder = recorder or FlightRecorder()
+        self._recorder.add(time.monotonic_ns(), Kind.OPENED)
 
     def __str__(self) -> str:
         """Return interface and channel."""
         return f"{self.interface} {self.channel}"
 
+    def receive(self, timeout: float) -> can.Message | None:
+        """Return the next frame, or None after a time in s; raises what python-can does."""
+        message = self._receive(timeout)
+        self.arrived = now = time.monotonic_ns()
+        if message is None:
+            self._recorder.add(now, Kind.NOTHING)
+            return None
+        identifier = message.arbitration_id
+        if message.is_extended_id:
+            identifier |= EXTENDED
+        if message.is_error_frame or message.is_remote_frame:
+            identifier |= ERROR if message.is_error_frame else REMOTE
+        self._recorder.add_frame(now, Kind.RECEIVED, message.timestamp, identifier, message.data)
+        return message
+
     def send(self, identifier: int, data: bytes) -> None:
         """Send an extended frame."""
+        self._recorder.add_frame(time.monotonic_ns(), Kind.SENT, 0.0, identifier | EXTENDED, data)
         try:
             self._bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=True),
                            timeout=SEND_TIMEOUT)
@@ -77,7 +100,9 @@ class CanLink:
 
     def lost(self, error: Exception) -> LinkError:
         """Return the error in words, for one that `receive` raised."""
-        return LinkError(f"lost {self}: {self._reason(error)}")
+        text = f"lost {self}: {self._reason(error)}"
+        self._recorder.add(time.monotonic_ns(), Kind.LOST, text.encode())
+        return LinkError(text)
 
     def close(self) -> None:
         """Close the bus; it may be gone already."""

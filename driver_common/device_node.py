@@ -20,10 +20,12 @@ from rclpy.parameter import Parameter as RosParameter
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from std_srvs.srv import Trigger
 
-from driver_common import diagnostics
+from driver_common import diagnostics, node_recorder
 from driver_common.device_thread import Bus, DeviceThread
 from driver_common.errors import DriverError, SettingError
+from driver_common.node_recorder import NodeRecorder
 from driver_common.parameters import ParameterStore, refusal
+from driver_common.recording import SERIAL
 from driver_common.settings import Option, Setting, Value
 
 SENSOR_NAME = re.compile("[a-z][a-z0-9_]*")
@@ -45,6 +47,7 @@ COMMON_OPTIONS = (
     Option("config_mode", kind=str, choices=CONFIG_MODES, default="push",
            description="What to do with settings that differ from the parameters given: "
                        "push = write them, check = warn, leave = nothing"),
+    *node_recorder.OPTIONS,
 )
 
 
@@ -74,6 +77,7 @@ class DeviceNode(LifecycleNode):
     """
 
     KIND = "sensor"  # what a device without a name is called
+    LINK = SERIAL  # what its recordings are of
     SEVERAL_SENSORS = True  # whether the bus can have more than one
     BUS_OPTIONS: Sequence[Option] = ()
     SENSOR_OPTIONS: Sequence[Option] = ()
@@ -96,10 +100,13 @@ class DeviceNode(LifecycleNode):
         self._statuses_due = 0.0
         self._statuses_made = 0.0
         self._diagnostics = diagnostics.Diagnostics(self)
+        self._recorder = NodeRecorder(self)
         self._devices: dict[str, Any] = {}
         self._entities: list[Callable[[], object]] = []
         self._declare_options()
         self.create_timer(diagnostics.PERIOD, self._publish_diagnostics,
+                          clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.create_timer(node_recorder.PERIOD, self._recorder.write_raw,
                           clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._refuse_impossible_transitions()
 
@@ -116,6 +123,10 @@ class DeviceNode(LifecycleNode):
 
     def add_device_interfaces(self, device: Any) -> None:
         """Create the publishers that depend on what the device is."""
+
+    def channel(self) -> str:
+        """Return the name of the bus in a recording, "" where it has none."""
+        return ""
 
     def describe(self, device: Any) -> str:
         """Return what was found, for the log."""
@@ -207,7 +218,7 @@ class DeviceNode(LifecycleNode):
 
     def show_settings(self, sensor: str, device: Any) -> None:
         """Declare a device's settings with the values that it reported; from any thread."""
-        self._later(lambda: self._show_settings(sensor, device))
+        self.later(lambda: self._show_settings(sensor, device))
 
     def _show_settings(self, sensor: str, device: Any) -> None:
         if self.bus is None or device not in self.bus.devices:
@@ -276,7 +287,7 @@ class DeviceNode(LifecycleNode):
                 self._write(device, before)
             raise
         if len(result) > sum(map(len, by_device.values())):
-            self._later(self.apply_options)
+            self.later(self.apply_options)
         return result
 
     def _write(self, device: Any, changes: Mapping[str, Value]) -> dict[str, Value]:
@@ -319,7 +330,7 @@ class DeviceNode(LifecycleNode):
         return ("the node is not configured; run 'ros2 lifecycle set "
                 f"{self.get_fully_qualified_name()} configure'")
 
-    def _later(self, job: Callable[[], object]) -> None:
+    def later(self, job: Callable[[], object]) -> None:
         """Run a job in the executor, where parameters may be touched."""
         def guarded() -> None:
             try:
@@ -359,6 +370,7 @@ class DeviceNode(LifecycleNode):
     def on_found(self, device: Any) -> None:
         """Show the device's settings as parameters."""
         self._note_news()
+        self._recorder.note_found(device)
         self.get_logger().info(f"{device.title}: connected to {self.describe(device)}")
         self.show_settings(device.options.name, device)
 
@@ -369,6 +381,7 @@ class DeviceNode(LifecycleNode):
     def on_lost(self, device: Any, error: DriverError) -> None:
         """Log why there is no device."""
         self._note_news()
+        self._recorder.note_error(f"{device.title}: {error}")
         self.get_logger().error(f"{device.title}: {error} (waiting for it)")
 
     def on_note(self, device: Any, text: str, *, warning: bool = False) -> None:
@@ -390,6 +403,7 @@ class DeviceNode(LifecycleNode):
             self._note_link_works()
             return
         if str(error) != str(self._bus_error):
+            self._recorder.note_error(str(error))
             self.get_logger().error(f"{error} (waiting for it)")
         self._bus_error = error
 
@@ -400,6 +414,7 @@ class DeviceNode(LifecycleNode):
 
     def _note_link_works(self) -> None:
         if self._bus_error is not None:
+            self._recorder.note_link_works()
             self.get_logger().info("the link is open again")
         self._bus_error = None
 
@@ -468,6 +483,8 @@ class DeviceNode(LifecycleNode):
         self._statuses_due = now + 0.9 * diagnostics.PERIOD
         try:
             self._statuses = [self.status_of(device) for device in self.bus.devices]
+            for status in self._statuses:
+                diagnostics.add_values(status, self._recorder.diagnostics())
         except Exception as error:  # it must not disturb the bus
             text = f"internal error, please report it: {error!r}"
             self.get_logger().error(text, throttle_duration_sec=60.0)
@@ -518,6 +535,7 @@ class DeviceNode(LifecycleNode):
             bus = self.make_bus()
             for sensor in self.sensors:
                 self.make_interfaces(sensor)
+            self.add_trigger("", "save_recording", self._recorder.save)
         except DriverError as error:
             self.get_logger().error(str(error))
             self._close()
@@ -563,6 +581,7 @@ class DeviceNode(LifecycleNode):
     def _close(self) -> None:
         if self.thread is not None:
             self.thread.stop()
+            self._recorder.finish_raw()
         self._close_simulator()
         self.thread = None
         self.bus = None
@@ -578,6 +597,7 @@ class DeviceNode(LifecycleNode):
         """Leave the devices stopped and the port closed."""
         if self.thread is not None:
             self.thread.stop()
+            self._recorder.finish_raw()
         self._close_simulator()
         super().destroy_node()
 

@@ -21,10 +21,16 @@ OK, WARN, ERROR, STALE = (DiagnosticStatus.OK, DiagnosticStatus.WARN, Diagnostic
 def to_status(name: str, hardware_id: str, level: bytes, message: str,
               values: Mapping[str, object]) -> DiagnosticStatus:
     """Return a status; values become text, numbers with at most six digits."""
-    return DiagnosticStatus(
-        name=name, hardware_id=hardware_id, level=level, message=message,
-        values=[KeyValue(key=key, value=f"{value:.6g}" if isinstance(value, float) else str(value))
-                for key, value in values.items()])
+    status = DiagnosticStatus(name=name, hardware_id=hardware_id, level=level, message=message)
+    add_values(status, values)
+    return status
+
+
+def add_values(status: DiagnosticStatus, values: Mapping[str, object]) -> None:
+    """Add values to a status, as `to_status` does."""
+    status.values += [
+        KeyValue(key=key, value=f"{value:.6g}" if isinstance(value, float) else str(value))
+        for key, value in values.items()]
 
 
 class Diagnostics:

@@ -10,6 +10,7 @@ import re
 import socket
 import termios
 import time
+from collections.abc import Iterator
 from typing import Any
 
 import serial
@@ -17,6 +18,7 @@ from serial.tools import list_ports
 
 from driver_common.advice import SERIAL_ERRORS
 from driver_common.errors import LinkError
+from driver_common.flight_recorder import FlightRecorder, Kind
 from driver_common.port_use import group_of, holders_text
 
 BITS_PER_BYTE = 10  # 8N1
@@ -35,17 +37,23 @@ class SerialLink:
     A port elsewhere (`socket://host:port`, `rfc2217://host:port`) that has not answered for
     `SILENCE` is opened again, because nothing else tells that its other end has gone.
 
+    Attributes:
+        time: The host's time in ns when the last write began or the last read ended.
+
     Args:
         port: Device path or URL.
         baud_rate: In Bd.
+        recorder: Gets all that passes.
 
     Raises:
         LinkError: From every method, with what is wrong and what to do.
     """
 
-    def __init__(self, port: str, baud_rate: int) -> None:
+    def __init__(self, port: str, baud_rate: int, recorder: FlightRecorder | None = None) -> None:
         """Open the port for this process alone."""
         self.port = port
+        self.time = 0
+        self._recorder = recorder or FlightRecorder()
         self._baud_rate = baud_rate
         self._scheme = port.partition("://")[0].lower() if "://" in port else ""
         self._unanswered = math.inf  # monotonic time of the first request without any answer
@@ -56,6 +64,7 @@ class SerialLink:
             raise LinkError(f"cannot open {port}: {self._scheme}:// is not possible here; give a "
                             f"device path, sim://MODEL, {', '.join(map('{}://'.format, SCHEMES))}")
         self._serial = self._opened()
+        self._record(Kind.OPENED)
 
     def _opened(self) -> Any:
         """Return the open port of pyserial."""
@@ -84,9 +93,10 @@ class SerialLink:
     @baud_rate.setter
     def baud_rate(self, baud_rate: int) -> None:
         if baud_rate != self._baud_rate:
-            with _Guard(self.port):
+            with self._guarded():
                 self._serial.baudrate = baud_rate
             self._baud_rate = baud_rate
+            self._recorder.note(f"{baud_rate} Bd")
 
     def seconds(self, length: int) -> float:
         """Return the time that `length` bytes take on the line."""
@@ -100,7 +110,8 @@ class SerialLink:
             self._serial = self._opened()
             self._unanswered = math.inf
         self._unanswered = min(self._unanswered, now)
-        with _Guard(self.port):
+        self._record(Kind.SENT, data)
+        with self._guarded():
             self._serial.write(data)
 
     def read(self, timeout: float) -> bytes:
@@ -109,13 +120,14 @@ class SerialLink:
         A busy or paused host may have held up adapter, network or simulator as well: the time that
         it took from us is waited once more.
         """
-        with _Guard(self.port):
+        with self._guarded():
             waiting = self._serial.in_waiting
             first = b"" if waiting else self._first_byte(max(timeout, 0))
             waiting = waiting or (self._serial.in_waiting if first else 0)
             data: bytes = first + (self._serial.read(waiting) if waiting else b"")
         if data:
             self._unanswered = math.inf
+        self._record(Kind.RECEIVED if data else Kind.NOTHING, data)
         return data
 
     def _first_byte(self, timeout: float) -> bytes:
@@ -143,22 +155,23 @@ class SerialLink:
         with contextlib.suppress(OSError):  # unplugged
             self._serial.close()
 
+    @contextlib.contextmanager
+    def _guarded(self) -> Iterator[None]:
+        """Turn what pyserial raises when a port vanishes into a LinkError."""
+        try:
+            yield
+        except (OSError, TypeError, termios.error) as error:
+            # TypeError: pyserial's own when the port was closed under it.
+            text = (f"{self.port} takes no bytes; is flow control on?"
+                    if isinstance(error, serial.SerialTimeoutException)
+                    else f"lost {self.port}: {_reason(self.port, error)}")
+            self._record(Kind.LOST, text.encode())
+            raise LinkError(text) from error
 
-class _Guard:
-    """Turns what pyserial raises when a port vanishes into a LinkError."""
-
-    def __init__(self, port: str) -> None:
-        self._port = port
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        if isinstance(error, serial.SerialTimeoutException):
-            raise LinkError(f"{self._port} takes no bytes; is flow control on?") from error
-        # TypeError: pyserial's own when the port was closed under it.
-        if isinstance(error, (OSError, TypeError, termios.error)):
-            raise LinkError(f"lost {self._port}: {_reason(self._port, error)}") from error
+    def _record(self, kind: Kind, content: bytes = b"") -> None:
+        now, self.time = time.monotonic_ns(), time.time_ns()
+        self._recorder.add_offset(self.time - now)
+        self._recorder.add(now, kind, content)
 
 
 def _reason(port: str, error: Exception) -> str:

@@ -221,6 +221,7 @@ class Acquisition:
         """Receive for a moment; look after a stream that fell silent."""
         frames = decoder.statistics.frames
         self._host_clock.follow()
+        self._line.recorder.add_offset(self._host_clock.offset)
         self._line.listen(LISTEN_TIME, self._sensor.options.may_wait)
         if decoder.statistics.frames != frames:
             self._last_frame = time.monotonic()

@@ -14,6 +14,7 @@ import can
 
 from driver_common.can_link import RECEIVE_BUFFER, CanLink, parse_options
 from driver_common.errors import FrameError, LinkError, NoAnswerError
+from driver_common.flight_recorder import FlightRecorder
 from icotronic_driver.commands import ACCELERATION_DATA
 from icotronic_driver.identifier import SPU_1, Identifier, node_name, receiver_filter
 from icotronic_driver.request import Request
@@ -51,6 +52,7 @@ class Line:
     """A CAN bus with a stationary unit, seen from the host.
 
     Attributes:
+        recorder: Has what passed of late.
         counts: What was counted.
         on_stream: Takes the data of each frame of the acceleration stream, when it was on the bus
             in s of the interface's clock, and its arrival in monotonic ns.
@@ -63,9 +65,11 @@ class Line:
             SettingError: An option has no "=".
         """
         parse_options(options)  # a wrong one is told now, and not at every attempt to open
+        self.recorder = FlightRecorder()
         self.counts = LineCounts()
         self.on_stream: StreamHandler | None = None
-        self._make_link = partial(CanLink, interface, channel, bitrate, options, FILTERS)
+        self._make_link = partial(CanLink, interface, channel, bitrate, options, FILTERS,
+                                  self.recorder)
         self._link: CanLink | None = None
         self._interrupted = threading.Event()
         self.interface = interface

@@ -19,6 +19,7 @@ from std_msgs.msg import Float64MultiArray
 
 from driver_common import diagnostics
 from driver_common.device_node import FRAME_ID, TIME_OFFSET, DeviceNode, Topic, run
+from driver_common.recording import CAN
 from driver_common.settings import Option
 from icotronic_driver.commands import parse_request
 from icotronic_driver.eeprom import PAGE_NAMES, Field, FieldValue
@@ -64,6 +65,7 @@ class IcotronicNode(DeviceNode, Listener):
     """Driver of one ICOtronic sensor behind a stationary unit on CAN."""
 
     SEVERAL_SENSORS = False
+    LINK = CAN
     BUS_OPTIONS = (
         Option("can_interface", kind=str, default="socketcan",
                description="Interface of python-can, such as socketcan or socketcand; sim = a "
@@ -197,6 +199,10 @@ class IcotronicNode(DeviceNode, Listener):
                 ("preview_save", self._preview_save),
                 ("save_all_settings", self._save)):
             self.add_trigger(sensor, name, action)
+
+    def channel(self) -> str:
+        """Return the name of the CAN channel."""
+        return str(self.option("can_channel"))
 
     # --- what the bus reports, in its thread ---
 

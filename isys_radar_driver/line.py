@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from typing import TypeVar
 
 from driver_common.errors import FrameError, LinkError, NoAnswerError, RefusedError
+from driver_common.flight_recorder import FlightRecorder
 from driver_common.serial_link import SerialLink
 from isys_radar_driver.commands import READ_DEVICE_NAME
 from isys_radar_driver.frames import FAILURE, MASTER, READ_RAW_SIGNALS, Frame, FrameParser
@@ -33,6 +34,7 @@ class Line:
     Attributes:
         port: Device path or pyserial URL.
         parser: Finds the frames; counts what is damaged.
+        recorder: Has what passed of late.
         stale_frames: Good frames that answered nothing.
         reply_began: Host's time in ns at which the last reply began, whole or damaged.
         damaged: Monotonic time in s at which something arrived damaged.
@@ -41,6 +43,7 @@ class Line:
     def __init__(self, port: str) -> None:
         """Prepare the line; nothing is opened."""
         self.port = port
+        self.recorder = FlightRecorder()
         self.parser = FrameParser()
         self.stale_frames = 0
         self.reply_began = 0
@@ -51,7 +54,7 @@ class Line:
 
     def open(self, baud_rate: int) -> None:
         """Open the port; raises LinkError."""
-        self._link = SerialLink(self.port, baud_rate)
+        self._link = SerialLink(self.port, baud_rate, self.recorder)
 
     def close(self) -> None:
         """Close the port."""

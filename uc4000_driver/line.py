@@ -20,6 +20,7 @@ from driver_common.errors import (
     RefusedError,
     SettingError,
 )
+from driver_common.flight_recorder import FlightRecorder
 from driver_common.serial_link import SerialLink
 from uc4000_driver.commands import READ_SERIAL_NUMBER, READ_VERSION, Command, Distance
 from uc4000_driver.exchange import NOISE_TIME, Exchange
@@ -87,6 +88,7 @@ class Line:
 
     Attributes:
         port: Device path or pyserial URL.
+        recorder: Has what passed of late.
         local_echo: Whether the line returns what is sent, as the user says (errata U9).
         echo: Whether it does, as far as we heard; None while unknown.
         stray_bytes: Bytes that answered nothing.
@@ -96,6 +98,7 @@ class Line:
     def __init__(self, port: str, local_echo: str = "auto") -> None:
         """Prepare the line; nothing is opened."""
         self.port = port
+        self.recorder = FlightRecorder()
         self.local_echo = local_echo
         self.echo: bool | None = None
         self.stray_bytes = 0
@@ -109,7 +112,7 @@ class Line:
 
     def open(self) -> None:
         """Open the port; raises LinkError."""
-        self._link = SerialLink(self.port, BAUD_RATE)
+        self._link = SerialLink(self.port, BAUD_RATE, self.recorder)
         self.echo = None
         self._late = {SHORT_REPLY}  # to what another program asked just now
 

@@ -1,0 +1,158 @@
+"""Recordings of nodes: on request, at an outage, or of all."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import NamedTuple
+
+import pytest
+from nodes import NodeProcess, Ros
+from sensor_msgs.msg import PointCloud2, Range
+
+from driver_common.flight_recorder import Kind, frame_of
+from driver_common.recording import CAN, SERIAL, read_recording
+from icotronic_driver.line import STREAM_ID
+from uc4000_driver.simulator.line import simulated_line
+
+
+class Driver(NamedTuple):
+    """How a driver is started with a simulator, and what it publishes."""
+
+    module: str
+    name: str
+    parameters: dict[str, object]
+    topic: str
+    kind: type
+    link: str
+
+
+DRIVERS = [
+    Driver("isys_radar_driver.node", "isys_radar", {"serial_port": "sim://iSYS-4001"}, "points",
+           PointCloud2, SERIAL),
+    Driver("uc4000_driver.node", "uc4000", {"serial_port": "sim://UC4000"}, "range", Range, SERIAL),
+    Driver("icotronic_driver.node", "icotronic", {"can_interface": "sim"}, "imu/batch", PointCloud2,
+           CAN),
+]
+
+
+@pytest.fixture
+def ros():
+    with Ros() as ros:
+        yield ros
+
+
+@pytest.fixture
+def home(tmp_path, monkeypatch):
+    monkeypatch.setenv("ROS_HOME", str(tmp_path / "ros"))
+    return tmp_path / "ros" / "recordings"
+
+
+def logs(directory, reason):
+    return sorted(directory.glob(f"*-{reason}.log"))
+
+
+@pytest.mark.parametrize("driver", DRIVERS, ids=lambda driver: driver.name)
+def test_the_last_minute_is_saved_on_request(ros, home, driver):
+    with NodeProcess(driver.module, driver.parameters | {"time_offset": -0.01},
+                     "-r", "__ns:=/left") as process:
+        node = ros.remote(f"/left/{driver.name}")
+        messages = node.subscribe(driver.kind, driver.topic)
+        ros.wait_until(lambda: len(messages) > 3)
+        response = node.trigger("save_recording")
+        status = ros.wait_for_status(
+            f"left/{driver.name}: {'radar' if driver.name == 'isys_radar' else 'sensor'}",
+            lambda status: "last recording" in status.values)
+        process.stop()
+    (path,) = logs(home, "request")
+    assert status.values["last recording"] == str(path)
+    assert response.success
+    assert response.message == f"saved {path}"
+    recording = read_recording(path)
+    assert recording.link == driver.link
+    assert recording.parameters["time_offset"] == -0.01
+    assert not recording.parameters.keys() & {"serial_port", "can_interface", "autostart"}
+    assert recording.facts["node"] == f"/left/{driver.name}"
+    assert "numpy" in recording.facts["versions"]
+    assert recording.facts["device"]
+    counts = Counter(entry.kind for entry in recording.entries)
+    assert counts[Kind.OPENED] == 1
+    assert counts[Kind.SENT] > 5
+    assert counts[Kind.RECEIVED] > 5
+    if driver.link == CAN:
+        assert any(frame_of(entry.content).identifier & 0x1FFFFFFF == STREAM_ID
+                   for entry in recording.entries if entry.kind is Kind.RECEIVED)
+    else:
+        assert any(title.startswith("setting ") for title in recording.facts)
+
+
+def test_nothing_is_saved_before_there_is_anything(ros, home):
+    with NodeProcess("uc4000_driver.node", {"autostart": False, "serial_port": "sim://UC4000"}):
+        node = ros.remote("/uc4000")
+        assert node.state() == "unconfigured"
+    assert not home.exists()
+
+
+def test_the_first_error_of_an_outage_is_a_recording(ros, tmp_path):
+    line, _ = simulated_line([7])
+    line.start()
+    with NodeProcess("uc4000_driver.node", {
+            "serial_port": line.port, "recording_directory": str(tmp_path / "outages")}) as process:
+        ranges = ros.remote("/uc4000").subscribe(Range, "range")
+        ros.wait_until(lambda: ranges)
+        line.faults.silent = True
+        process.wait_for_line("what led to this outage is in")
+        process.stop()
+    line.close()
+    (path,) = (tmp_path / "outages").iterdir()
+    recording = read_recording(path)
+    assert "no answer" in recording.facts["because"]
+    notes = [entry.text for entry in recording.entries if entry.kind is Kind.NOTE]
+    assert notes[0].startswith("found sensor: UC4000")
+    assert "no answer" in notes[-1]
+
+
+def test_an_outage_without_a_directory_is_no_recording(ros, home):
+    line, _ = simulated_line([7])
+    line.start()
+    with NodeProcess("uc4000_driver.node", {"serial_port": line.port}) as process:
+        ranges = ros.remote("/uc4000").subscribe(Range, "range")
+        ros.wait_until(lambda: ranges)
+        line.faults.silent = True
+        process.wait_for_line("(waiting for it)")
+        process.stop()
+    line.close()
+    assert not home.exists()
+
+
+def test_all_is_recorded_until_the_end(ros, tmp_path):
+    with NodeProcess("uc4000_driver.node", {
+            "serial_port": "sim://UC4000", "record_raw": True,
+            "recording_directory": str(tmp_path)}) as process:
+        ranges = ros.remote("/uc4000").subscribe(Range, "range")
+        ros.wait_until(lambda: len(list(tmp_path.glob("*.part"))) and len(ranges) > 40)
+        process.stop()
+    (path,) = tmp_path.iterdir()
+    entries = [entry for entry in read_recording(path).entries if entry.kind is not Kind.OFFSET]
+    assert entries[0].kind is Kind.OPENED
+    sent = [entry for entry in entries if entry.kind is Kind.SENT]
+    assert len(sent) > len(ranges)
+    assert not any(entry.kind is Kind.GAP for entry in entries)
+
+
+def test_a_directory_that_cannot_be_written_is_told_once(ros, tmp_path):
+    (tmp_path / "file").write_text("")
+    with NodeProcess("uc4000_driver.node", {
+            "serial_port": "sim://UC4000", "record_raw": True,
+            "recording_directory": str(tmp_path / "file")}) as process:
+        node = ros.remote("/uc4000")
+        ranges = node.subscribe(Range, "range")
+        process.wait_for_line("cannot write a recording to")
+        count = len(ranges)
+        ros.wait_until(lambda: len(ranges) > count + 40)
+        response = node.trigger("save_recording")
+        process.stop()
+    assert not response.success
+    lines = [line for line in process.lines if "cannot write a recording to" in line]
+    assert len(lines) == 2  # once of its own accord, once as the answer
+
+
