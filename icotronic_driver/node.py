@@ -58,7 +58,7 @@ QUEUE_DEPTH = 2000  # samples that a publisher keeps for slow subscribers, 0.2 s
 LEAST_QUEUE = 500  # samples, 50 ms
 RECORDER = "rosbag2_recorder"  # name of the node of 'ros2 bag record'
 BATCH_DEPTH = 100  # batches, 2 s
-GATHERING_TIME = 0.02  # s for which frames wait for each other where nobody wants each at once
+GATHERING_TIME = 0.016  # s for which frames wait for each other where nobody wants each at once
 
 
 class IcotronicNode(DeviceNode, Listener):
