@@ -30,7 +30,6 @@ from icotronic_driver.maintenance import STORED
 from icotronic_driver.sensor import Channel, Options, Phase, Sensor, UnitIdentity
 from icotronic_driver.session import IcotronicBus, Listener
 from icotronic_driver.settings import SETTINGS
-from icotronic_driver.simulator.line import simulated_network
 from icotronic_driver.streaming import AXES
 from icotronic_driver.values import CLOCK, decode_mac, encode_mac
 from icotronic_driver.vibration import COLUMNS, Vibration
@@ -141,6 +140,8 @@ class IcotronicNode(DeviceNode, Listener):
         interface, channel = self.option("can_interface"), self.option("can_channel")
         options: list[str] = self.option("can_options")
         if interface == SIMULATED:
+            from icotronic_driver.simulator.line import simulated_network
+
             self.simulator = simulator = simulated_network().start()
             interface = "socketcand"
             options = [f"host={simulator.host}", f"port={simulator.port}"]

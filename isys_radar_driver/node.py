@@ -21,7 +21,6 @@ from isys_radar_driver.models import find_model
 from isys_radar_driver.radar import Options, Radar
 from isys_radar_driver.session import Listener, RadarBus
 from isys_radar_driver.settings import ALL_SETTINGS
-from isys_radar_driver.simulator.line import simulated_line
 from isys_radar_driver.targets import TargetList
 from msg_conversions.multi_array import to_float32_multi_array
 from msg_conversions.point_cloud import to_point_cloud
@@ -103,6 +102,8 @@ class IsysRadarNode(DeviceNode, Listener):
         options = [self._sensor_options(sensor) for sensor in self.sensors]
         port: str = self.option("serial_port")
         if port.startswith(SIMULATED):
+            from isys_radar_driver.simulator.line import simulated_line
+
             simulator, _ = simulated_line(
                 [port.removeprefix(SIMULATED)],
                 [option.address for option in options if option.address],

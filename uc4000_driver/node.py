@@ -28,7 +28,6 @@ from uc4000_driver.line import ECHO_CHOICES
 from uc4000_driver.sensor import Measurement, Options, Sensor
 from uc4000_driver.session import Uc4000Bus
 from uc4000_driver.settings import ALL_SETTINGS
-from uc4000_driver.simulator.line import simulated_line
 from uc4000_driver.telegram import BAUD_RATE, LAST_ADDRESS, error_text
 
 SIMULATED = "sim://"
@@ -93,6 +92,8 @@ class Uc4000Node(DeviceNode, Listener):
         options = [self._sensor_options(sensor) for sensor in self.sensors]
         port: str = self.option("serial_port")
         if port.startswith(SIMULATED):
+            from uc4000_driver.simulator.line import simulated_line
+
             simulator, _ = simulated_line(
                 [option.address for option in options if option.address],
                 product=port.removeprefix(SIMULATED))

@@ -146,3 +146,12 @@ def test_every_core_can_be_imported_without_ros():
 def test_a_radar_can_be_used_without_ros():
     assert run(WITHOUT_ROS % (ROS_NAMES, CORE_MODULES) + RADAR_SESSION) == [
         "iSYS-4001 000001, firmware 1.310", "42.0 False"]
+
+
+@pytest.mark.parametrize("driver", DRIVERS)
+def test_a_node_loads_its_simulator_only_to_use_it(driver):
+    code = (f"import sys, {driver}.node; "
+            "print([name for name in sys.modules if 'simulator' in name])")
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True,
+                          check=True)
+    assert done.stdout == "[]\n"
