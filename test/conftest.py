@@ -1,6 +1,7 @@
 """The environment of every test. It must be in place before rclpy is first imported."""
 
 import atexit
+import functools
 import os
 import shutil
 import tempfile
@@ -18,14 +19,21 @@ os.environ["ROS_LOG_DIR"] = log_directory
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"  # a field of the wrong type is an error, not a crash
 
 
-@pytest.hookimpl(tryfirst=True)  # before pytest-xdist looks
-def pytest_collection_modifyitems(items):
-    """Let tests that share something of their module run in one process (of pytest-xdist)."""
-    for item in items:
-        fixtures = item._fixtureinfo.name2fixturedefs.values()
-        if any(definition.scope != "function" for definitions in fixtures
-               for definition in definitions if definition.baseid):
-            item.add_marker(pytest.mark.xdist_group(item.module.__name__))
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """Hand out tests one by one, but those of files that share something as a whole, and first."""
+    from xdist.scheduler import LoadScopeScheduling
+
+    @functools.cache
+    def shares(path):
+        return 'scope="module"' in (config.rootpath / path).read_text(encoding="utf-8")
+
+    class Scheduling(LoadScopeScheduling):
+        def _split_scope(self, nodeid):
+            path = nodeid.partition("::")[0]
+            return path if shares(path) else nodeid
+
+    return Scheduling(config, log)
 
 
 @pytest.fixture
