@@ -219,10 +219,12 @@ class Acquisition:
 
     def _receive(self, decoder: StreamDecoder) -> None:
         """Receive for a moment; look after a stream that fell silent."""
-        frames = decoder.statistics.frames
+        frames, lost = decoder.statistics.frames, decoder.statistics.lost
         self._host_clock.follow()
         self._line.recorder.add_offset(self._host_clock.offset)
+        self._sensor.pauses.begin()
         self._line.listen(LISTEN_TIME, self._sensor.options.may_wait)
+        self._sensor.pauses.end(LISTEN_TIME, decoder.statistics.lost - lost)
         if decoder.statistics.frames != frames:
             self._last_frame = time.monotonic()
         elif time.monotonic() - self._last_frame > self._longest_silence:

@@ -373,6 +373,9 @@ class IcotronicNode(DeviceNode, Listener):
                    for name, value in vars(sensor.readings).items() if value is not None}
         values |= {
             "frames": counts.frames, "lost frames": counts.lost,
+            "frames lost in pauses of this host": sensor.pauses.lost,
+            "pauses of this host": sensor.pauses.count,
+            "longest pause of this host [s]": sensor.pauses.longest,
             "duplicate frames": counts.duplicates, "damaged frames": counts.damaged,
             "fault of the last damaged frame": counts.fault,
             "stale frames": line.counts.stale, "foreign frames": line.counts.foreign,
@@ -408,6 +411,8 @@ class IcotronicNode(DeviceNode, Listener):
                 recent.other_host,
             f"{recent.lost} frames lost on the radio in the last {RECENT_TIME:g} s; bring the "
             "sensor nearer": recent.lost > LOSS_LIMIT * recent.frames and not recent.other_host,
+            f"{recent.lost_here} frames lost because this host was busy or asleep in the last "
+            f"{RECENT_TIME:g} s": recent.lost_here,
             f"{recent.errors} error frames in the last {RECENT_TIME:g} s; check wiring, "
             "termination and bit rate": recent.errors,
             f"{len(sensor.differing)} settings are not as wanted": sensor.differing,
@@ -422,23 +427,23 @@ class IcotronicNode(DeviceNode, Listener):
     def _recent_counts(self, sensor: Sensor) -> _Counts:
         """Return what was counted in the last `RECENT_TIME` s."""
         counts, line = sensor.statistics, self.bus.line.counts
-        now = _Counts(time.monotonic(), counts.frames, counts.lost, line.foreign, line.other_host,
-                      line.errors)
+        here = sensor.pauses.lost
+        now = _Counts(time.monotonic(), counts.frames, counts.lost - here, here, line.foreign,
+                      line.other_host, line.errors)
         self._history.append(now)
         while now.time - self._history[0].time > RECENT_TIME:
             self._history.popleft()
         first = self._history[0]
-        return _Counts(now.time - first.time, now.frames - first.frames, now.lost - first.lost,
-                       now.foreign - first.foreign, now.other_host - first.other_host,
-                       now.errors - first.errors)
+        return _Counts._make(after - before for before, after in zip(first, now, strict=True))
 
 
 class _Counts(NamedTuple):
-    """What was counted until a time in s."""
+    """What was counted until a time in s; frames lost on the way, and in pauses of this host."""
 
     time: float
     frames: int
     lost: int
+    lost_here: int
     foreign: int
     other_host: int
     errors: int

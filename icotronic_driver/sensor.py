@@ -7,6 +7,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from driver_common.device import Device, DeviceOptions
+from driver_common.host_pauses import HostPauses
 from driver_common.sample_clock import SampleClock
 from icotronic_driver.settings import SETTINGS
 from icotronic_driver.streaming import (
@@ -156,6 +157,7 @@ class Sensor(Device):
         decoder: Decodes the stream; None while there is none.
         clock: Gives the samples of the stream their times.
         totals: Statistics of the streams before the present one.
+        pauses: Pauses of this host while there was a stream.
         time_outs: How often it or the stationary unit did not answer.
     """
 
@@ -176,6 +178,7 @@ class Sensor(Device):
         self.decoder: StreamDecoder | None = None
         self.clock = SampleClock(1.0)
         self.totals = StreamStatistics()
+        self.pauses = HostPauses()
         self.time_outs = 0
 
     def __str__(self) -> str:

@@ -110,6 +110,15 @@ class Process:
         self._reader.join()
         return code
 
+    def suspend(self, condition):
+        """Suspend the program until a condition is true."""
+        self._process.send_signal(signal.SIGSTOP)
+        deadline = time.monotonic() + DEADLINE
+        while not condition() and time.monotonic() < deadline:
+            time.sleep(0.01)
+        self._process.send_signal(signal.SIGCONT)
+        assert condition(), "it does not happen"
+
     def stop(self, number=signal.SIGINT):
         """Send a signal; the program ends well and tells of no error in its code."""
         self._process.send_signal(number)

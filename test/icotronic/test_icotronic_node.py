@@ -490,6 +490,16 @@ def test_losses_are_told_in_log_and_diagnostics(station):
     station.network.faults.loss = 0.0
 
 
+def test_a_suspended_node_tells_that_it_was_this_host_and_loses_nothing(station):
+    before = station.wait_for_status(lambda status: "pauses of this host" in status.values).values
+    streamed = station.network.streamed
+    station.process.suspend(lambda: station.network.streamed > streamed + 200)  # 1.2 s of them
+    status = station.wait_for_status(lambda status: int(status.values["pauses of this host"])
+                                     > int(before["pauses of this host"]))
+    assert float(status.values["longest pause of this host [s]"]) > 0.25
+    assert status.values["frames lost in pauses of this host"] == "0"
+
+
 def test_damaged_frames_are_told_in_the_diagnostics(station):
     station.network.send(CanFrame(STREAM_ID, bytes.fromhex("A2 00 01")))
     status = station.wait_for_status(
