@@ -31,9 +31,11 @@ setup(
         "console_scripts": [
             "convert_imu = sensor_tools.convert_imu:main",
             "demo = sensor_tools.demo.program:main",
+            "doctor = sensor_tools.cli.program:doctor_main",
             "icotronic_node = icotronic_driver.node:main",
             "isys_radar_node = isys_radar_driver.node:main",
             "record_qos = sensor_tools.record_qos:main",
+            "sensors = sensor_tools.cli.program:main",
             "simulate = sensor_tools.simulate:main",
             "uc4000_node = uc4000_driver.node:main",
         ],

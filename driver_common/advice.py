@@ -48,6 +48,9 @@ ECHO = Advice("the line returns what is sent",
 
 # --- devices on a serial line ---
 
+NOTHING_ANSWERS = Advice(
+    "no sensor answers, at no address and no baud rate",
+    "check power and wiring (RS-485: A and B swapped? Rx and Tx swapped?)")
 SILENCE = Advice("", "check power, wiring and the address")
 SILENCE_BEHIND_ECHO = Advice(
     "the line returns what is sent, so it is right up to there",
@@ -66,6 +69,11 @@ SEVERAL = Advice("several sensors answer ({addresses})",
 SAME_ADDRESS = Advice("only damaged answers come from address {address}",
                       "several devices have this address: connect them one by one and give each "
                       "its own; or there is interference")
+
+ANOTHER_RATE = Advice("a sensor answers at {rate} Bd, not at {wanted}",
+                      "correct the parameter serial_baud")
+ANOTHER_FAMILY = Advice("{model} answers, which is no {family}",
+                        "connect the right one, or use {node}_node")
 
 # --- CAN ---
 
@@ -102,6 +110,24 @@ NOT_IN_RANGE = Advice("the sensor{which} is not in range of the stationary unit 
                       "{in_range})", "wake it up, bring it nearer or correct the parameter")
 DOES_NOT_CONNECT = Advice("the sensor {which} does not connect",
                           "bring it nearer, or check its battery")
+
+# --- ROS ---
+
+DISCOVERY_OFF = Advice("ROS_AUTOMATIC_DISCOVERY_RANGE is OFF: nodes do not find each other",
+                       "set it to SUBNET or LOCALHOST, or list peers in ROS_STATIC_PEERS")
+DISCOVERY_LOCAL = Advice("nodes of other computers are not seen (ROS_AUTOMATIC_DISCOVERY_RANGE is "
+                         "LOCALHOST)", "for other computers set it to SUBNET, everywhere")
+DISCOVERY_UNKNOWN = Advice("ROS_AUTOMATIC_DISCOVERY_RANGE is {value!r}, which ROS does not know",
+                           "use SUBNET, LOCALHOST, OFF or SYSTEM_DEFAULT")
+LOCALHOST_ONLY = Advice("ROS_LOCALHOST_ONLY is set, which is deprecated and overrules "
+                        "ROS_AUTOMATIC_DISCOVERY_RANGE",
+                        "unset it, and set ROS_AUTOMATIC_DISCOVERY_RANGE")
+SAME_NAME = Advice("{count} nodes have the name {name}",
+                   "end all but one, or give each its name with '-r __node:=NAME'")
+SHALLOW_RECORDER = Advice("{process} keeps {depth} messages of {topic} while it is busy; {needed} "
+                          "are needed to lose nothing",
+                          "start it with '--qos-profile-overrides-path FILE', made by 'ros2 run "
+                          "industrial_sensor_drivers record_qos > FILE'")
 
 # --- what the operating system says ---
 

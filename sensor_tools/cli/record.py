@@ -1,0 +1,88 @@
+"""`sensors record`: measurements into a CSV file."""
+
+from __future__ import annotations
+
+import csv
+import sys
+from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+from typing import TextIO
+
+import click
+
+from driver_common.errors import DriverError
+from sensor_tools.cli.measuring import duration_option, measure
+from sensor_tools.cli.places import Wanted, place_options
+from sensor_tools.cli.sensor import session
+from sensor_tools.families import Family
+from sensor_tools.measurements import Row
+
+FLUSH_PERIOD = 1.0  # s of measurements that a power failure may cost
+SECOND = 1_000_000_000  # ns
+
+
+class Table:
+    """Writes measurements as CSV: RFC 4180, UTF-8, a heading with units, times since the epoch.
+
+    Attributes:
+        count: Measurements so far.
+    """
+
+    def __init__(self, file: TextIO) -> None:
+        """Write to a file."""
+        self.count = 0
+        self._file = file
+        self._writer = csv.writer(file)
+
+    def begin(self, family: Family) -> None:
+        """Write the heading."""
+        self._writer.writerow(["time [s]", *(f"{name} [{unit}]" if unit else name
+                                             for name, unit in family.columns.items())])
+
+    def take(self, stamp: int, rows: Sequence[Row]) -> None:
+        """Write a measurement of so many ns since the epoch."""
+        time = f"{stamp // SECOND}.{stamp % SECOND:09d}"
+        self._writer.writerows((time, *map(_text, row)) for row in rows)
+        self.count += 1
+
+    def flush(self) -> None:
+        """Have the system take what was written."""
+        self._file.flush()
+
+
+@click.command()
+@click.argument("file", type=click.Path(dir_okay=False, allow_dash=True, path_type=Path))
+@place_options()
+@duration_option
+@click.option("--overwrite", is_flag=True, help="Replace a file that exists.")
+def record(wanted: Wanted, file: Path, duration: float | None, overwrite: bool) -> None:
+    """Write what a sensor measures to a CSV file.
+
+    FILE may be - for standard output. Each target, distance or sample is a row; times are those
+    of the measurement.
+    """
+    with _opened(file, overwrite) as stream:
+        table = Table(stream)
+        with session(wanted, table.take) as one:
+            one.connect()
+            table.begin(one.family)
+            measure(one, duration, table.flush, FLUSH_PERIOD)
+    click.echo(f"{table.count} measurements in {file}", err=True)
+
+
+def _opened(file: Path, overwrite: bool) -> AbstractContextManager[TextIO]:
+    if str(file) == "-":
+        return nullcontext(sys.stdout)
+    try:
+        return file.open("w" if overwrite else "x", newline="", encoding="utf-8")
+    except FileExistsError:
+        raise DriverError(f"{file} exists already; --overwrite replaces it") from None
+    except OSError as error:
+        raise DriverError(f"cannot write {file}: {error.strerror}") from None
+
+
+def _text(value: float | str | None) -> str:
+    if value is None:
+        return ""
+    return f"{value:.9g}" if isinstance(value, float) else str(value)

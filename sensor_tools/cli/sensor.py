@@ -1,0 +1,118 @@
+"""Reaching one sensor: find it, open a session with it, and leave it as it was."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Iterator
+
+from driver_common import advice
+from driver_common.errors import NoAnswerError, WrongDeviceError
+from sensor_tools.cli.output import progress_bar
+from sensor_tools.cli.places import Wanted, require_place
+from sensor_tools.families import FAMILIES, Bus, Device, Family, families_of
+from sensor_tools.measurements import Take, ignore
+from sensor_tools.search.result import Finding, Found, Progress
+
+REACH_TIME = 30.0  # s in which a sensor must be connected; by radio it can take 20
+
+
+class Session:
+    """An open session with one sensor.
+
+    Attributes:
+        family: Its family.
+        found: How it was found.
+        bus: The session.
+        device: The sensor, the only one of the session.
+    """
+
+    def __init__(self, found: Found, take: Take = ignore) -> None:
+        """Open the bus; raises LinkError."""
+        self.found = found
+        self.family: Family = FAMILIES[found.family]
+        self.bus: Bus = self.family.make_bus(found, take)
+        self.device: Device = self.bus.devices[0]
+        self.bus.open()
+
+    def look(self) -> None:
+        """Read who the sensor is and its settings, and nothing else; raises DriverError."""
+        if self.family.look is None:
+            self.connect()
+        else:
+            self.family.look(self.bus, self.device)
+
+    def connect(self) -> None:
+        """Connect the sensor as a node does, but with its settings as they are.
+
+        Raises:
+            DriverError: It does not answer any more.
+        """
+        end = time.monotonic() + REACH_TIME
+        while not self.device.is_connected:
+            pause = self.bus.poll()
+            if self.device.error is not None:
+                raise self.device.error
+            if time.monotonic() > end:
+                raise NoAnswerError(f"{self.found} does not connect")
+            time.sleep(0.0 if self.device.is_connected else pause)
+
+
+@contextlib.contextmanager
+def session(wanted: Wanted, take: Take = ignore) -> Iterator[Session]:
+    """Yield a session with the sensor that is meant; closed at last. Raises DriverError."""
+    one = Session(find(wanted), take)
+    try:
+        yield one
+    finally:
+        one.bus.close()
+
+
+def find(wanted: Wanted) -> Found:
+    """Return the sensor that is meant.
+
+    Raises:
+        DriverError: There is none, or there are several.
+    """
+    place = require_place(wanted)
+    with progress_bar() as progress:
+        found, findings = _search(wanted, progress)
+    fitting = [one for one in found if _fits(one, wanted)]
+    if len(fitting) == 1:
+        return fitting[0]
+    if len(fitting) > 1:
+        several = "; ".join(map(str, fitting))
+        which = "--name or --mac" if fitting[0].rssi is not None else "--address"
+        raise WrongDeviceError(f"several sensors answer on {place} ({several}); say which one "
+                               f"with {which}")
+    if found:
+        there = "; ".join(map(str, found))
+        raise WrongDeviceError(f"on {place} there is no such sensor, but {there}")
+    wrong = [f"{finding.cause}; {finding.remedy}".strip("; ") for finding in findings
+             if finding.is_wrong]
+    raise NoAnswerError(f"no sensor answers on {place}; "
+                        + ("; ".join(wrong) or advice.SILENCE_RS485.text()))
+
+
+def _search(wanted: Wanted, progress: Progress) -> tuple[list[Found], list[Finding]]:
+    """Return the sensors and what is wrong, of the first family that has any."""
+    place = require_place(wanted)
+    findings: list[Finding] = []
+    for family in families_of(place, wanted.family):
+        results = list(family.search(place, progress))
+        findings += [one for one in results if isinstance(one, Finding)]
+        found = [one for one in results if isinstance(one, Found) and one.is_sensor]
+        if found:
+            return found, findings
+    return [], findings
+
+
+def _fits(found: Found, wanted: Wanted) -> bool:
+    return (wanted.address in (0, _number(found.address))
+            and wanted.name in ("", found.name) and wanted.mac in ("", found.address.upper()))
+
+
+def _number(address: str) -> int:
+    return int(address) if address.isdecimal() else -1
+
+

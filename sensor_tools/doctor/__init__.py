@@ -1,0 +1,1 @@
+"""Finding out what is wrong with a port, a bus or the middleware; read-only."""

@@ -1,0 +1,156 @@
+"""Looking for iSYS radars on a serial port, read-only: none is stopped, started or changed.
+
+A broadcast finds a single radar at once. Where several answer it together, what arrives is damaged:
+then every address is asked, one after the other. A late answer still counts, as it tells its
+address.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+
+from driver_common import advice
+from driver_common.errors import DriverError, LinkError, RefusedError, WrongDeviceError
+from isys_radar_driver import commands
+from isys_radar_driver.access import Access
+from isys_radar_driver.frames import (
+    BROADCAST,
+    FIRST_ADDRESS,
+    LAST_ADDRESS,
+    MASTER,
+    FrameParser,
+)
+from isys_radar_driver.line import Line
+from isys_radar_driver.models import BAUD_RATES, MODELS, model_of_product
+from isys_radar_driver.radar import Identity, Options, Radar
+from sensor_tools.search.place import SerialPlace
+from sensor_tools.search.result import Finding, Found, Progress, Result
+
+FAMILY = "isys"
+ADDRESSES = range(FIRST_ADDRESS, LAST_ADDRESS + 1)
+DEFAULT_ADDRESSES = tuple(dict.fromkeys(model.address for model in MODELS.values()))
+ANSWER_TIME = 0.025  # s in which a device begins to answer, as a rule
+ANSWER_SIZE = 30  # bytes of question and answer
+LAST_ANSWER_TIME = 0.1  # s for those that are late
+SWEEP_STEPS = 16  # in the progress bar
+DAMAGE = 4  # bytes; less is a glitch
+
+
+def search(place: SerialPlace, progress: Progress,
+           addresses: Sequence[int] = ADDRESSES) -> Iterator[Result]:
+    """Yield the radars on a port, and what is wrong there; raises LinkError.
+
+    Args:
+        place: The port.
+        progress: Told how far the search is.
+        addresses: Those that are asked one by one where several radars answer at once.
+    """
+    rates = (place.baud_rate,) if place.baud_rate else BAUD_RATES
+    if "://" in place.port:
+        rates = rates[:1]  # the line is somewhere else, and has the rate that it has
+    progress.expect(len(rates))
+    line = Line(place.port)
+    line.open(rates[0])
+    garbage = False
+    try:
+        for rate in rates:
+            progress.step(f"{place.port}: iSYS at {rate} Bd")
+            line.link.baud_rate = rate
+            found, damaged = _ask_all(line)
+            garbage = garbage or damaged
+            if damaged and addresses:
+                found = _sweep(line, addresses, progress) or found
+                addresses = ()  # once is enough: only at the right rate does anybody answer
+            for address in found:
+                yield _identified(place, line, address)
+            if found:
+                garbage = False
+                break
+    finally:
+        line.close()
+    if garbage:
+        yield Finding.of(place, "answers", advice.GARBAGE, family="iSYS")
+
+
+def identify(line: Line, address: int) -> Identity:
+    """Return who a radar says it is, without its hardware; raises DriverError."""
+    access, radar = Access(line), Radar(Options(address=address))
+    name = access.execute(radar, commands.READ_DEVICE_NAME)
+    product = access.execute(radar, commands.READ_PRODUCT_INFORMATION)
+    firmware = access.execute(radar, commands.READ_FIRMWARE_VERSION)
+    return Identity(model_of_product(product).with_firmware(firmware.number), name, firmware,
+                    None, None, None)
+
+
+def _identified(place: SerialPlace, line: Line, address: int) -> Result:
+    """Return the radar at an address, or what is wrong with it; raises LinkError."""
+    check, damage = f"address {address}", _damage(line)
+    try:
+        identity = identify(line, address)
+    except LinkError:
+        raise
+    except WrongDeviceError as error:
+        return Finding(str(place), check, str(error), advice.SAME_ADDRESS.remedy)
+    except DriverError as error:
+        if _damage(line) - damage >= DAMAGE:
+            return Finding.of(place, check, advice.SAME_ADDRESS, address=address)
+        return Finding(str(place), check, str(error), advice.POOR_LINE.remedy)
+    return Found(FAMILY, place, identity.model.name, str(address), line.link.baud_rate,
+                 serial_number=identity.serial_number, firmware=str(identity.firmware),
+                 parameters={"address": address, "serial_baud": line.link.baud_rate})
+
+
+def _ask_all(line: Line) -> tuple[list[int], bool]:
+    """Return the addresses that answer a broadcast, and whether more may be hidden."""
+    before = _damage(line)
+    frames = line.broadcast(commands.READ_ADDRESS.request(BROADCAST))
+    found = sorted({frame.source for frame in frames})
+    damage = _damage(line) - before
+    if not found and not damage:
+        found = [address for address in DEFAULT_ADDRESSES if _answers(line, address)]
+    return found, damage >= DAMAGE or len(found) > 1
+
+
+def _damage(line: Line) -> int:
+    """Return how much arrived so far that makes no sense, about in bytes."""
+    return line.parser.damaged_frames + line.parser.dropped_bytes
+
+
+def _answers(line: Line, address: int) -> bool:
+    try:
+        line.exchange(commands.READ_DEVICE_NAME.request(address), lambda frame: None,
+                      LAST_ANSWER_TIME, attempts=1)
+    except LinkError:
+        raise
+    except RefusedError:
+        return True
+    except DriverError:
+        return False
+    return True
+
+
+def _sweep(line: Line, addresses: Sequence[int], progress: Progress) -> list[int]:
+    """Return those of the addresses that answer; raises LinkError."""
+    link, parser = line.link, FrameParser()
+    found: set[int] = set()
+    progress.expect(SWEEP_STEPS)
+    share = len(addresses) / SWEEP_STEPS
+    wait = ANSWER_TIME + link.seconds(ANSWER_SIZE)
+    for number, address in enumerate(addresses):
+        if number % share < 1:
+            progress.step(f"{line.port}: iSYS at {link.baud_rate} Bd, address {address}")
+        link.write(commands.READ_ADDRESS.request(address).encode())
+        found |= _sources(line, parser, wait)
+    return sorted(found | _sources(line, parser, LAST_ANSWER_TIME))
+
+
+def _sources(line: Line, parser: FrameParser, seconds: float) -> set[int]:
+    """Return the addresses from which answers come in so many s; the first ends the wait."""
+    end = time.monotonic() + seconds
+    while (remaining := end - time.monotonic()) > 0:
+        found = {frame.source for frame in parser.feed(line.link.read(remaining))
+                 if frame.destination == MASTER}
+        if found:
+            return found
+    return set()

@@ -1,0 +1,60 @@
+"""Looking for UC4000 sensors on a wire, read-only."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from driver_common import advice
+from driver_common.errors import FrameError, NoAnswerError, RefusedError
+from sensor_tools.search.place import SerialPlace
+from sensor_tools.search.result import Finding, Found, Progress, Result
+from uc4000_driver import commands
+from uc4000_driver.line import Line
+from uc4000_driver.sensor import PRODUCT
+from uc4000_driver.telegram import BAUD_RATE, FIRST_ADDRESS, LAST_ADDRESS
+
+FAMILY = "uc4000"
+ADDRESSES = range(FIRST_ADDRESS, LAST_ADDRESS + 1)
+ATTEMPTS = 2
+
+
+def search(place: SerialPlace, progress: Progress) -> Iterator[Result]:
+    """Yield the sensors on a port, and what is wrong there; raises LinkError."""
+    if place.baud_rate not in (0, BAUD_RATE):
+        return
+    progress.expect(len(ADDRESSES))
+    line = Line(place.port)
+    line.open()
+    try:
+        for address in ADDRESSES:
+            progress.step(f"{place.port}: UC4000 at address {address}")
+            yield from _at(place, line, address)
+        if line.echo:
+            yield Finding.of(place, "echo", advice.ECHO, is_wrong=False)
+    finally:
+        line.close()
+
+
+def _at(place: SerialPlace, line: Line, address: int) -> Iterator[Result]:
+    """Yield the sensor at an address, or what is wrong with it; raises LinkError."""
+    who = f"address {address}"
+    something_came = False
+    for _ in range(ATTEMPTS):
+        try:
+            line.ask(address, commands.READ_ADDRESS, who)
+            something_came = True
+            version = line.ask(address, commands.READ_VERSION, who).value
+            number = line.ask(address, commands.READ_SERIAL_NUMBER, who).value
+        except NoAnswerError as error:
+            # Damage to what the line asks first, after a silence, counts for it as no answer.
+            something_came = something_came or isinstance(error.__context__, FrameError)
+            if not something_came:
+                return
+        except (FrameError, RefusedError):
+            something_came = True
+        else:
+            if version.startswith("HW"):
+                yield Found(FAMILY, place, PRODUCT, str(address), BAUD_RATE, serial_number=number,
+                            firmware=version, parameters={"address": address})
+                return
+    yield Finding.of(place, who, advice.SAME_ADDRESS, address=address)
