@@ -18,6 +18,6 @@ def change_address(wanted: Wanted, new_address: int) -> None:
     """
     with session(wanted) as one:
         one.connect()
-        old = one.device.address
         one.family.change_address(one.bus, one.device, new_address)
-        click.echo(f"the sensor moved from address {old} to {one.device.address} and keeps it")
+        click.echo(f"the sensor moved from address {one.found.address} to {one.device.address} "
+                   "and keeps it")
