@@ -88,7 +88,8 @@ def _compare(place: SerialPlace, wanted: Wanted, found: list[Found]) -> Iterator
         yield Finding.of(place, "family", advice.ANOTHER_FAMILY, model=found[0].model,
                          family=FAMILIES[wanted.family].title, node=family.node)
     elif wanted.address and str(wanted.address) not in (one.address for one in found):
-        yield Finding.of(place, "address", advice.ANOTHER_ADDRESS, address=addresses, rate="",
+        what = advice.SEVERAL if len(found) > 1 else advice.ANOTHER_ADDRESS
+        yield Finding.of(place, "address", what, address=addresses, addresses=addresses, rate="",
                          parameters=" address")
     elif place.baud_rate and place.baud_rate not in rates:
         yield Finding.of(place, "baud rate", advice.ANOTHER_RATE, rate=rates[0],

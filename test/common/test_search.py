@@ -97,13 +97,15 @@ def test_a_radar_that_measures_by_itself_measures_on(bench):
 class DeafLine:
     """A serial port with a clock of its own: every wait is over at once."""
 
+    time = 0
+
     def __init__(self, clock, garbage_at):
         self.clock = clock
         self.garbage_at = garbage_at
         self.baud_rate = 0
         self.waiting = b""
 
-    def __call__(self, port, baud_rate):
+    def __call__(self, port, baud_rate, recorder=None):
         self.baud_rate = baud_rate
         return self
 
