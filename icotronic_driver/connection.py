@@ -6,6 +6,7 @@ import contextlib
 import math
 import time
 
+from driver_common import advice
 from driver_common.device import Note
 from driver_common.errors import DriverError, NoAnswerError, RefusedError, WrongDeviceError
 from icotronic_driver import commands
@@ -108,8 +109,7 @@ class Connection:
         before = self._line.counts.other_host
         self._line.listen(OTHER_HOST_TIME)
         if self._line.counts.other_host != before:
-            raise WrongDeviceError("another host on the bus works with this stationary unit; "
-                                   "end one of the two")
+            raise WrongDeviceError(advice.OTHER_HOST.text())
 
     def look_around(self) -> None:
         """Ask the stationary unit which sensors are in range; raises DriverError."""
@@ -165,13 +165,12 @@ class Connection:
         """Return why no sensor can be taken, for people."""
         in_range = "; ".join(map(str, self._sensor.seen))
         if self._is_named:
-            return (f"the sensor{_described(self._sensor.options)} is not in range of the "
-                    f"stationary unit (in range: {in_range or 'none'}); wake it up, bring it "
-                    "nearer or correct the parameter")
+            return advice.NOT_IN_RANGE.text(which=_described(self._sensor.options),
+                                            in_range=in_range or "none")
         if in_range:
             return ("no sensor has told its name, its MAC address and its RSSI yet (in range: "
                     f"{in_range})")
-        return "no sensor is in range of the stationary unit; wake it up or bring it nearer"
+        return advice.NONE_IN_RANGE.text()
 
     def _await_connection(self) -> bool:
         """Ask for the connection, again every few seconds, until it is there."""
@@ -182,8 +181,7 @@ class Connection:
             self._greet()
             return True
         if now > self._connect_until:
-            raise NoAnswerError(f"the sensor {self._sensor.target} does not connect; bring it "
-                                "nearer, or check its battery")
+            raise NoAnswerError(advice.DOES_NOT_CONNECT.text(which=self._sensor.target))
         if now >= self._connect_again:
             self._line.request(commands.CONNECT_MAC.request(STU_1, self._sensor.target.mac))
             self._connect_again = now + CONNECT_RETRY

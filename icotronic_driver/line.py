@@ -12,6 +12,7 @@ from typing import TypeVar
 
 import can
 
+from driver_common import advice
 from driver_common.can_link import RECEIVE_BUFFER, CanLink, parse_options
 from driver_common.errors import FrameError, LinkError, NoAnswerError
 from driver_common.flight_recorder import FlightRecorder
@@ -107,8 +108,7 @@ class Line:
         size = self.link.receive_buffer
         if self.interface != "socketcan" or not 0 < size < ENOUGH_BUFFER:
             return ""
-        return (f"the kernel keeps only {size // 1024} KiB of frames while this host is busy; "
-                f"'sudo sysctl -w net.core.rmem_max={RECEIVE_BUFFER}' allows more")
+        return advice.SMALL_BUFFER.text(size=size // 1024, wanted=RECEIVE_BUFFER)
 
     def listen(self, duration: float, may_wait: float = 0.0) -> None:
         """Receive for some s and hand over what arrives; raises LinkError.
@@ -179,8 +179,7 @@ class Line:
         if message.is_error_frame:
             self.counts.errors += 1
             if message.arbitration_id & ERROR_BUS_OFF:
-                raise LinkError(f"{self.name} is bus-off: check wiring, termination and bit rate; "
-                                "'ip link set … type can restart-ms 100' lets it recover")
+                raise LinkError(f"{self.name}: {advice.BUS_OFF.text()}")
             return
         try:
             if not message.is_extended_id:

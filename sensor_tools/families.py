@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from driver_common.errors import SettingError
+from driver_common.settings import Parameter, Value
 from icotronic_driver.line import Line as CanLine
 from icotronic_driver.sensor import Options as SthOptions
 from icotronic_driver.sensor import Sensor as Sth
@@ -20,12 +21,14 @@ from sensor_tools.measurements import Take
 from sensor_tools.search import icotronic, isys, uc4000
 from sensor_tools.search.place import CanPlace, SerialPlace
 from sensor_tools.search.result import Found, Progress, Result
+from uc4000_driver.commands import MAX_CYCLES, PROFILES
 from uc4000_driver.sensor import Options as UltrasonicOptions
 from uc4000_driver.sensor import Sensor as Ultrasonic
 from uc4000_driver.session import Uc4000Bus
 
 Bus: TypeAlias = Any  # a session; what they have in common is in DeviceBus
 Device: TypeAlias = Any
+Options: TypeAlias = Mapping[str, Value]
 
 
 @dataclass(frozen=True)
@@ -38,11 +41,12 @@ class Family:
         title: What it is.
         search: Yields the sensors of a place, and what is wrong there.
         make_bus: Returns a session with a sensor that was found, which leaves its settings as they
-            are; what is measured goes to the second argument.
+            are. What is measured goes to the second argument; the third has values of `options`.
         look: Reads who a sensor is and its settings, without anything else, on an open bus; None
             where `connect` does no more than that.
         identity: Returns what a connected sensor says of itself, by name.
-        columns: What a measurement consists of: name and unit.
+        options: How it can measure, named as the parameters of its node.
+        columns: Returns what a measurement of a connected sensor consists of: name and unit.
         save: Has the sensor keep its settings; returns what was done.
         change_address: Gives the sensor another address, for good.
         factory_reset: Restores the factory settings.
@@ -52,20 +56,30 @@ class Family:
     node: str
     title: str
     search: Callable[[Any, Progress], Iterator[Result]]
-    make_bus: Callable[[Found, Take], Bus]
+    make_bus: Callable[[Found, Take, Options], Bus]
     look: Callable[[Bus, Device], None] | None
     identity: Callable[[Device], Mapping[str, object]]
-    columns: Mapping[str, str]
+    options: Mapping[str, Parameter]
+    columns: Callable[[Device], Mapping[str, str]]
     save: Callable[[Bus, Device], str]
     change_address: Callable[[Bus, Device, int], None]
     factory_reset: Callable[[Bus, Device], None]
 
 
+
+def _by_name(*options: Parameter) -> Mapping[str, Parameter]:
+    return {option.name: option for option in options}
+
+
 # --- iSYS ---
 
-def _radar_bus(found: Found, take: Take) -> RadarBus:
+_RADAR_OPTIONS = _by_name(Parameter("output", kind=int, minimum=1, maximum=3))
+
+
+def _radar_bus(found: Found, take: Take, values: Options) -> RadarBus:
     assert isinstance(found.place, SerialPlace)
-    options = RadarOptions(address=int(found.address), config_mode="leave")
+    options = RadarOptions(address=int(found.address), config_mode="leave",
+                           **values)  # type: ignore[arg-type]
     return RadarBus(found.place.port, found.rate, [options], measurements.RadarListener(take))
 
 
@@ -92,9 +106,16 @@ def _save_radar(bus: RadarBus, radar: Radar) -> str:
 
 # --- UC4000 ---
 
-def _ultrasonic_bus(found: Found, take: Take) -> Uc4000Bus:
+_ULTRASONIC_OPTIONS = _by_name(
+    Parameter("profile", kind=str, choices=dict.fromkeys(PROFILES, 0)),
+    Parameter("cycles", kind=int, minimum=1, maximum=MAX_CYCLES),
+    Parameter("rate", kind=float, unit="Hz", minimum=0.0, maximum=20.0))
+
+
+def _ultrasonic_bus(found: Found, take: Take, values: Options) -> Uc4000Bus:
     assert isinstance(found.place, SerialPlace)
-    options = UltrasonicOptions(address=int(found.address), config_mode="leave")
+    options = UltrasonicOptions(address=int(found.address), config_mode="leave",
+                                **values)  # type: ignore[arg-type]
     return Uc4000Bus(found.place.port, [options], measurements.UltrasonicListener(take))
 
 
@@ -106,10 +127,18 @@ def _ultrasonic_identity(sensor: Ultrasonic) -> Mapping[str, object]:
 
 # --- ICOtronic ---
 
-def _sth_bus(found: Found, take: Take) -> IcotronicBus:
+_STH_OPTIONS = _by_name(
+    Parameter("channels", kind=str,
+              choices=dict.fromkeys(("x", "y", "z", "xy", "xz", "yz", "xyz"), 0)),
+    Parameter("calibration_source", kind=str,
+              choices=dict.fromkeys(("auto", "device", "range"), 0)))
+
+
+def _sth_bus(found: Found, take: Take, values: Options) -> IcotronicBus:
     place = found.place
     assert isinstance(place, CanPlace)
-    options = SthOptions(sensor_mac=found.address, config_mode="leave")
+    options = SthOptions(sensor_mac=found.address, config_mode="leave",
+                         **values)  # type: ignore[arg-type]
     return IcotronicBus(CanLine(place.interface, place.channel, place.bitrate, place.options),
                         options, measurements.SthListener(take))
 
@@ -138,16 +167,17 @@ def _has_not(what: str) -> Callable[..., Any]:
 
 FAMILIES: Mapping[str, Family] = {family.name: family for family in (
     Family("uc4000", "uc4000", "Pepperl+Fuchs UC4000 ultrasonic sensor", uc4000.search,
-           _ultrasonic_bus, None, _ultrasonic_identity, measurements.ULTRASONIC_COLUMNS,
+           _ultrasonic_bus, None, _ultrasonic_identity, _ULTRASONIC_OPTIONS,
+           lambda sensor: measurements.ULTRASONIC_COLUMNS,
            lambda bus, sensor: "a UC4000 keeps every setting at once; there is nothing to save",
            lambda bus, sensor, address: bus.maintenance.change_address(sensor, address),
            _has_not("command that restores its factory settings")),
     Family("isys", "isys_radar", "InnoSenT iSYS radar", isys.search, _radar_bus, _look_at_radar,
-           _radar_identity, measurements.RADAR_COLUMNS, _save_radar,
+           _radar_identity, _RADAR_OPTIONS, lambda radar: measurements.RADAR_COLUMNS, _save_radar,
            lambda bus, radar, address: bus.maintenance.change_address(radar, address),
            lambda bus, radar: bus.maintenance.restore_factory_settings(radar)),
     Family("icotronic", "icotronic", "ICOtronic wireless accelerometer", icotronic.search,
-           _sth_bus, None, _sth_identity, measurements.STH_COLUMNS, _save_sth,
+           _sth_bus, None, _sth_identity, _STH_OPTIONS, measurements.sth_columns, _save_sth,
            _has_not("address; 'sensors set name=…' gives it another name"),
            _has_not("command that restores its factory settings")),
 )}

@@ -10,10 +10,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from icotronic_driver.gathering import Conversion
 from icotronic_driver.sensor import Channel, Sensor
 from icotronic_driver.session import Listener as StreamListener
-from icotronic_driver.streaming import AXES
 from isys_radar_driver.radar import Radar
 from isys_radar_driver.session import Listener as TargetListener
 from isys_radar_driver.targets import TargetList
@@ -24,10 +22,15 @@ from uc4000_driver.sensor import Sensor as Ultrasonic
 Row: TypeAlias = Sequence[float | int | str | None]
 Take: TypeAlias = Callable[[int, Sequence[Row]], None]  # time in ns since the epoch, and rows
 
+RAW_VALUES = 0x10000  # of 16 bits
 RADAR_COLUMNS: Mapping[str, str] = {
     "target": "", "range": "m", "azimuth": "rad", "radial_velocity": "m/s", "intensity": "dB"}
 ULTRASONIC_COLUMNS: Mapping[str, str] = {"range": "m", "outcome": "", "temperature": "°C"}
-STH_COLUMNS: Mapping[str, str] = dict.fromkeys(AXES, "m/s²")
+
+
+def sth_columns(sensor: Sensor) -> Mapping[str, str]:
+    """Return name and unit of each streamed channel of a connected sensor."""
+    return {channel.name: "m/s²" for channel in sensor.channels}
 
 
 def ignore(stamp: int, rows: Sequence[Row]) -> None:
@@ -63,7 +66,7 @@ class UltrasonicListener(DistanceListener):
 
 
 class SthListener(StreamListener):
-    """Hands over samples, each with its own time; channels that are not streamed are empty."""
+    """Hands over samples of the streamed channels, each with its own time."""
 
     def __init__(self, take: Take) -> None:
         """Hand rows to `take`."""
@@ -71,25 +74,20 @@ class SthListener(StreamListener):
 
     def on_stream(self, sensor: Sensor) -> Callable[[int, float, tuple[int, ...]], None]:
         """Return what takes the frames of a stream."""
-        tables = [_table(channel) for channel in sensor.channels]
-        places = [AXES.index(channel.name) for channel in sensor.channels]
+        tables = list(map(_table, sensor.channels))
         count, take = len(tables), self._take
 
         def on_frame(stamp: int, period: float, values: tuple[int, ...]) -> None:
             for first in range(0, len(values), count):
-                row: list[float | None] = [None] * len(AXES)
-                for place, table, raw in zip(places, tables, values[first:first + count],
-                                             strict=True):
-                    row[place] = table[raw]
-                take(stamp + round(first // count * period), [row])
+                take(stamp + first // count * int(period),  # as the node does
+                     [[table[raw] for table, raw in zip(tables, values[first:first + count],
+                                                        strict=True)]])
 
         return on_frame
 
 
 def _table(channel: Channel) -> list[float]:
-    """Return the acceleration in m/s² of each raw value, as the node publishes it."""
-    conversion = Conversion([lambda raw: channel.slope * raw + channel.offset], [0])
-    accelerations: list[float] = np.asarray(conversion.tables[0][1]).tolist()
-    return accelerations
-
-
+    """Return what each raw value means, as the node publishes it: a 32-bit number."""
+    raw = np.arange(RAW_VALUES)
+    values: list[float] = (channel.slope * raw + channel.offset).astype(np.float32).tolist()
+    return values

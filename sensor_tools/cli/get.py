@@ -6,11 +6,10 @@ from collections.abc import Sequence
 
 import click
 
-from driver_common.errors import SettingError
-from driver_common.settings import suggestion
 from sensor_tools.cli.output import print_json, print_table
 from sensor_tools.cli.places import Wanted, place_options
 from sensor_tools.cli.sensor import session
+from sensor_tools.cli.values import row_of
 
 
 @click.command()
@@ -25,10 +24,7 @@ def get(wanted: Wanted, names: Sequence[str], as_json: bool) -> None:
     with session(wanted) as one:
         one.look()
         settings, values = one.device.settings, one.device.values
-    for name in names:
-        if name not in settings:
-            raise SettingError(f'there is no setting "{name}"{suggestion(name, settings)}')
-    chosen = names or list(settings)
+    chosen = [row_of(settings, name).name for name in names] or list(settings)
     if as_json:
         print_json({name: values[name] for name in chosen})
         return

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import functools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, TypeVar
 
 import click
@@ -33,6 +33,7 @@ class Wanted:
         address: Its address on the line, 0 = any.
         name: Its name on the radio, "" = any.
         mac: Its MAC address, "" = any.
+        how: How it is to measure: options of its family and their values, as texts.
     """
 
     place: Place | None
@@ -40,6 +41,7 @@ class Wanted:
     address: int = 0
     name: str = ""
     mac: str = ""
+    how: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
 
 _OPTIONS: Sequence[Callable[[F], F]] = (
@@ -58,6 +60,11 @@ _OPTIONS: Sequence[Callable[[F], F]] = (
     click.option("--family", type=click.Choice([*FAMILIES]), default=None,
                  help="Only sensors of this family."),
 )
+_MEASURING: Sequence[Callable[[F], F]] = (
+    click.option("--with", "how", multiple=True, metavar="OPTION=VALUE",
+                 help="How to measure, such as channels=xyz, profile=a or output=2: parameters of "
+                      "the node."),
+)
 _ONE_SENSOR: Sequence[Callable[[F], F]] = (
     click.option("--address", type=click.IntRange(1, 255), metavar="N",
                  help="Address on the line, where there are several."),
@@ -66,9 +73,10 @@ _ONE_SENSOR: Sequence[Callable[[F], F]] = (
 )
 
 
-def place_options(*, one_sensor: bool = True) -> Callable[[F], F]:
+def place_options(*, one_sensor: bool = True, measuring: bool = False) -> Callable[[F], F]:
     """Return the decorator that adds the options to a command; it gets a `Wanted` as `wanted`."""
-    options = (*_OPTIONS, *(_ONE_SENSOR if one_sensor else ()))
+    options = (*_OPTIONS, *(_ONE_SENSOR if one_sensor else ()),
+               *(_MEASURING if measuring else ()))
 
     def decorate(command: F) -> F:
         @functools.wraps(command)
@@ -101,7 +109,8 @@ def _wanted(given: dict[str, Any]) -> Iterator[Wanted]:
         elif channel:
             place = CanPlace(channel, interface, bitrate, options)
         yield Wanted(place, given.pop("family") or "", given.pop("address", None) or 0,
-                     given.pop("name", None) or "", (given.pop("mac", None) or "").upper())
+                     given.pop("name", None) or "", (given.pop("mac", None) or "").upper(),
+                     dict(map(split_assignment, given.pop("how", ()))))
 
 
 def _simulated_port(port: str, stack: contextlib.ExitStack) -> str:
@@ -119,6 +128,14 @@ def _simulated_bus(stack: contextlib.ExitStack) -> CanPlace:
     server = simulated_network().start()
     stack.callback(server.close)
     return CanPlace("can0", "socketcand", options=(f"host={server.host}", f"port={server.port}"))
+
+
+def split_assignment(text: str) -> tuple[str, str]:
+    """Return name and value of "NAME=VALUE"; raises UsageError."""
+    name, separator, value = text.partition("=")
+    if not separator or not name or not value:
+        raise click.UsageError(f"{text!r} is not like output1.range_max=25")
+    return name, value
 
 
 def require_place(wanted: Wanted) -> Place:

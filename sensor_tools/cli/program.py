@@ -69,7 +69,7 @@ sensors.add_command(_other_program("demo", "Simulated sensors, nodes and a pictu
 def main(args: Sequence[str] | None = None, command: click.Command = sensors,
          name: str = "sensors") -> None:
     """Run a command and end the process with its exit code."""
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     try:
         sys.exit(command.main(args, prog_name=name, standalone_mode=False))
     except click.ClickException as error:

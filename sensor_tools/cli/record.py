@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TextIO
@@ -15,7 +15,6 @@ from driver_common.errors import DriverError
 from sensor_tools.cli.measuring import duration_option, measure
 from sensor_tools.cli.places import Wanted, place_options
 from sensor_tools.cli.sensor import session
-from sensor_tools.families import Family
 from sensor_tools.measurements import Row
 
 FLUSH_PERIOD = 1.0  # s of measurements that a power failure may cost
@@ -35,10 +34,10 @@ class Table:
         self._file = file
         self._writer = csv.writer(file)
 
-    def begin(self, family: Family) -> None:
-        """Write the heading."""
+    def begin(self, columns: Mapping[str, str]) -> None:
+        """Write the heading: names and units."""
         self._writer.writerow(["time [s]", *(f"{name} [{unit}]" if unit else name
-                                             for name, unit in family.columns.items())])
+                                             for name, unit in columns.items())])
 
     def take(self, stamp: int, rows: Sequence[Row]) -> None:
         """Write a measurement of so many ns since the epoch."""
@@ -53,7 +52,7 @@ class Table:
 
 @click.command()
 @click.argument("file", type=click.Path(dir_okay=False, allow_dash=True, path_type=Path))
-@place_options()
+@place_options(measuring=True)
 @duration_option
 @click.option("--overwrite", is_flag=True, help="Replace a file that exists.")
 def record(wanted: Wanted, file: Path, duration: float | None, overwrite: bool) -> None:
@@ -66,7 +65,7 @@ def record(wanted: Wanted, file: Path, duration: float | None, overwrite: bool) 
         table = Table(stream)
         with session(wanted, table.take) as one:
             one.connect()
-            table.begin(one.family)
+            table.begin(one.family.columns(one.device))
             measure(one, duration, table.flush, FLUSH_PERIOD)
     click.echo(f"{table.count} measurements in {file}", err=True)
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from driver_common import advice
 from driver_common.errors import NoAnswerError, WrongDeviceError
 from sensor_tools.cli.output import progress_bar
 from sensor_tools.cli.places import Wanted, require_place
+from sensor_tools.cli.values import value_of
 from sensor_tools.families import FAMILIES, Bus, Device, Family, families_of
 from sensor_tools.measurements import Take, ignore
 from sensor_tools.search.result import Finding, Found, Progress
@@ -27,11 +28,12 @@ class Session:
         device: The sensor, the only one of the session.
     """
 
-    def __init__(self, found: Found, take: Take = ignore) -> None:
-        """Open the bus; raises LinkError."""
+    def __init__(self, found: Found, take: Take, how: Mapping[str, str]) -> None:
+        """Open the bus; raises DriverError."""
         self.found = found
         self.family: Family = FAMILIES[found.family]
-        self.bus: Bus = self.family.make_bus(found, take)
+        options = {name: value_of(self.family.options, name, text) for name, text in how.items()}
+        self.bus: Bus = self.family.make_bus(found, take, options)
         self.device: Device = self.bus.devices[0]
         self.bus.open()
 
@@ -61,7 +63,7 @@ class Session:
 @contextlib.contextmanager
 def session(wanted: Wanted, take: Take = ignore) -> Iterator[Session]:
     """Yield a session with the sensor that is meant; closed at last. Raises DriverError."""
-    one = Session(find(wanted), take)
+    one = Session(find(wanted), take, wanted.how)
     try:
         yield one
     finally:

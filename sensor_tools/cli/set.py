@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import click
 
-from driver_common.errors import SettingError
-from driver_common.settings import Setting, Value, suggestion
-from sensor_tools.cli.places import Wanted, place_options
+from sensor_tools.cli.places import Wanted, place_options, split_assignment
 from sensor_tools.cli.sensor import session
-
-WORDS: Mapping[str, Value] = {"true": True, "on": True, "yes": True,
-                              "false": False, "off": False, "no": False}
+from sensor_tools.cli.values import value_of
 
 
 @click.command("set")
@@ -25,40 +21,13 @@ def set_settings(wanted: Wanted, changes: Sequence[str], and_save: bool) -> None
     It shows what the sensor reports then. The sensor keeps them until power-off, unless it is
     told to save them. A measurement that runs is stopped.
     """
-    given = dict(map(_split, changes))
+    given = dict(map(split_assignment, changes))
     with session(wanted) as one:
         one.connect()
         settings, before = one.device.settings, dict(one.device.values)
         for name, value in one.bus.write(one.device, {
-                name: _value(settings, name, text) for name, text in given.items()}).items():
+                name: value_of(settings, name, text) for name, text in given.items()}).items():
             text = settings[name].text
             click.echo(f"{name}: {text(before[name])} → {text(value)}")
         if and_save:
             click.echo(one.family.save(one.bus, one.device))
-
-
-def _split(change: str) -> tuple[str, str]:
-    name, separator, text = change.partition("=")
-    if not separator or not name or not text:
-        raise click.UsageError(f"{change!r} is not like output1.range_max=25")
-    return name, text
-
-
-def _value(settings: Mapping[str, Setting], name: str, text: str) -> Value:
-    """Return the value that a text stands for; raises SettingError."""
-    if name not in settings:
-        raise SettingError(f'there is no setting "{name}"{suggestion(name, settings)}')
-    setting = settings[name]
-    if setting.kind is bool:
-        return setting.check(WORDS.get(text.lower(), text))
-    if setting.kind in (int, float):
-        return setting.check(_number(text))
-    return setting.check(text)
-
-
-def _number(text: str) -> float | str:
-    """Return the number that a text is, else the text."""
-    try:
-        return float(text)
-    except ValueError:
-        return text

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import click
 from rich.live import Live
@@ -15,7 +15,6 @@ from sensor_tools.cli.measuring import duration_option, measure
 from sensor_tools.cli.output import console
 from sensor_tools.cli.places import Wanted, place_options
 from sensor_tools.cli.sensor import session
-from sensor_tools.families import Family
 from sensor_tools.measurements import Row
 
 REFRESH = 0.1  # s on a terminal
@@ -56,7 +55,7 @@ class Values:
 
 
 @click.command()
-@place_options()
+@place_options(measuring=True)
 @duration_option
 def watch(wanted: Wanted, duration: float | None) -> None:
     """Show live what a sensor measures.
@@ -66,32 +65,32 @@ def watch(wanted: Wanted, duration: float | None) -> None:
     values = Values()
     with session(wanted, values.take) as one:
         one.connect()
-        title, family = str(one.found), one.family
+        title, columns = str(one.found), one.family.columns(one.device)
         if sys.stdout.isatty():
             with Live(console=console(), auto_refresh=False) as live:
-                measure(one, duration, lambda: live.update(_table(title, family, values),
+                measure(one, duration, lambda: live.update(_table(title, columns, values),
                                                         refresh=True), REFRESH)
         else:
-            measure(one, duration, lambda: click.echo(_line(family, values)), PLAIN_REFRESH)
+            measure(one, duration, lambda: click.echo(_line(columns, values)), PLAIN_REFRESH)
 
 
-def _table(title: str, family: Family, values: Values) -> Table:
+def _table(title: str, columns: Mapping[str, str], values: Values) -> Table:
     """Return the last measurement as a table."""
     table = Table(title=title, title_justify="left", pad_edge=False, box=None,
                   caption=f"{values.count} measurements, {values.rate():.1f} per second; Ctrl-C "
                           "ends", caption_justify="left")
-    for name, unit in family.columns.items():
+    for name, unit in columns.items():
         table.add_column(f"{name} [{unit}]" if unit else name, justify="right", min_width=9)
     for row in values.rows[:MOST_ROWS]:
         table.add_row(*map(_text, row))
     return table
 
 
-def _line(family: Family, values: Values) -> str:
+def _line(columns: Mapping[str, str], values: Values) -> str:
     """Return the last measurement in a line."""
     rows = "; ".join(", ".join(
         f"{name} {_text(value)} {unit}".rstrip() for (name, unit), value in zip(
-            family.columns.items(), row, strict=True) if value is not None)
+            columns.items(), row, strict=True) if value is not None)
         for row in values.rows[:MOST_ROWS])
     return f"{values.rate():.1f} per second: {rows or 'nothing yet'}"
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import os
 import pty
 import signal
@@ -17,6 +18,7 @@ from bench_sensors import Bench, run
 
 from isys_radar_driver.simulator.radar import SimulatedRadar
 from sensor_tools import document, node_files
+from sensor_tools.cli import output
 from sensor_tools.cli.program import sensors
 from sensor_tools.search import icotronic
 from sensor_tools.search.place import CanPlace, SerialPlace
@@ -290,11 +292,12 @@ def test_targets_are_recorded_as_the_node_publishes_them(bench, command, tmp_pat
 
 def test_samples_are_recorded_one_by_one(bench, command):
     _, words = bench.network()
-    outcome = command("record", "-", *words, "--duration", 0.5)
+    outcome = command("record", "-", *words, "--duration", 0.5, "--with", "channels=xz")
     rows = rows_of(outcome.out)
     times = [float(row["time [s]"]) for row in rows]
     assert times == sorted(times)
-    assert all(-1000 < float(row["x [m/s²]"]) < 1000 and row["y [m/s²]"] == "" for row in rows)
+    assert list(rows[0]) == ["time [s]", "x [m/s²]", "z [m/s²]"]
+    assert all(-1000 < float(row[name]) < 1000 for row in rows for name in list(row)[1:])
     assert f"{len(rows)} measurements" in outcome.err
 
 
@@ -344,6 +347,9 @@ def test_watch_draws_on_a_terminal(bench):
     (["info", "--can", "can0", "--can-option", "x"], 1, "can_options must be like"),
     (["info", "--port", "sim://iSYS-9"], 1, '"iSYS-9" is not a known iSYS model'),
     (["set", "--port", "sim://UC4000", "gain_db"], 2, "is not like output1.range_max=25"),
+    (["watch", "--port", "sim://UC4000", "--with", "profile=z"], 1,
+     "profile must be one of a, b, c, user, not 'z'"),
+    (["watch", "--port", "sim://UC4000", "--with", "channels=x"], 1, 'no setting "channels"'),
     (["inform"], 2, "No such command 'inform'"),
     (["record", "/missing/x.csv", "--port", "sim://UC4000"], 1, "cannot write /missing/x.csv: No"),
 ])
@@ -407,3 +413,17 @@ def test_nothing_needs_ros(words):
     done = subprocess.run([sys.executable, "-c", WITHOUT_ROS, *words], cwd=ROOT,
                           capture_output=True, text=True, timeout=50, check=False)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("option", [
+    option for family in node_files.FAMILIES.values() for option in family.options.values()],
+    ids=lambda option: option.name)
+def test_how_to_measure_is_said_as_to_the_nodes(option):
+    (row,) = {(row.kind, row.limits, row.choices and tuple(row.choices))
+              for driver in document.DRIVERS for row in driver.options if row.name == option.name}
+    assert row == (option.kind, option.limits, option.choices and tuple(option.choices))
+
+
+def test_json_has_no_numbers_that_are_none(capsys):
+    output.print_json({"offset": float("nan"), "range": [float("inf"), 1.5]})
+    assert json.loads(capsys.readouterr().out) == {"offset": None, "range": [None, 1.5]}

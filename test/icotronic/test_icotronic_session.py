@@ -673,7 +673,7 @@ def test_bus_off_is_an_error_that_says_what_to_do_and_the_bus_is_opened_again(st
     opened, error, reopened = service.states
     assert (opened, reopened) == (None, None)
     assert isinstance(error, LinkError)
-    assert str(error).startswith("socketcand can0 is bus-off: check wiring, termination and bit")
+    assert str(error).startswith("socketcand can0: it is bus-off; check wiring, termination")
     wait_until(lambda: len(service.heard.streams) == 2 and service.heard.streams[1].frames)
 
 
