@@ -21,7 +21,7 @@ from isys_radar_driver.targets import Resolution, TargetList, decode_target_list
 if TYPE_CHECKING:
     from isys_radar_driver.session import Listener
 
-DOUBT_TIME = 30.0  # s after damage in which a list must also go on from the ones before it
+NEWS_TIME = 1.0  # s after a list; later the next one is taken if it is possible at all
 REALIGN_PERIOD = 30.0  # s between restarts of a radar that is out of its turn
 
 
@@ -113,8 +113,7 @@ class Acquisition:
         """Read one target list, and what else was asked for; raises DriverError."""
         model, options, listener = radar.known_model, radar.options, self._listener
         resolution = self.resolution(radar)
-        timeout = (max(model.timeout, 1.1 * radar.cycle_time) + LATENCY
-                   + self._access.line.link.seconds(radar.list_size(Resolution.BITS_32)))
+        timeout = max(model.timeout, 1.1 * radar.cycle_time) + LATENCY
         targets, stamp = self._read_target_list(radar, resolution, timeout)
         begin = _monotonic(stamp)
         if self._objection(radar, targets, begin):
@@ -124,7 +123,10 @@ class Acquisition:
         listener.on_target_list(radar, targets, stamp)
         if options.read_range_list and model.supports(commands.READ_RANGE_LIST):
             range_list, stamp = self._access.timed(radar, commands.READ_RANGE_LIST, timeout)
-            listener.on_range_list(radar, range_list, targets, stamp)
+            if radar.limits.allow_range(range_list.range):
+                listener.on_range_list(radar, range_list, targets, stamp)
+            else:
+                radar.statistics.implausible_lists += 1
         if options.read_digital_outputs and model.supports(commands.READ_DIGITAL_OUTPUTS):
             outputs, stamp = self._access.timed(radar, commands.READ_DIGITAL_OUTPUTS, timeout)
             listener.on_digital_outputs(radar, outputs, stamp)
@@ -166,8 +168,8 @@ class Acquisition:
         if objection:
             line.damaged = time.monotonic()
         jump = radar.continuity.follow(targets, begin, begin - MEMORY_CYCLES * radar.cycle_time)
-        in_doubt = time.monotonic() - line.damaged < DOUBT_TIME
-        return objection or (jump if in_doubt else "")
+        has_news = bool(radar.arrivals) and begin < radar.arrivals[-1] + NEWS_TIME
+        return objection or (jump if line.in_doubt and has_news else "")
 
     def resolution(self, radar: Radar) -> Resolution:
         """Return the resolution of the target lists; raises SettingError."""

@@ -21,7 +21,7 @@ from isys_radar_driver.access import ATTEMPTS, Access
 from isys_radar_driver.acquisition import Acquisition
 from isys_radar_driver.commands import Location
 from isys_radar_driver.frames import BROADCAST
-from isys_radar_driver.models import BAUD_RATES, model_of_product
+from isys_radar_driver.models import BAUD_RATES, RANGE_BOUND, model_of_product
 from isys_radar_driver.radar import Identity, Radar
 from isys_radar_driver.settings import record_of, settings_of
 
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from isys_radar_driver.session import Listener
 
 BOARD_TEMPERATURES = {"dsp": commands.READ_DSP_TEMPERATURE, "rfe": commands.READ_RFE_TEMPERATURE}
+EXPLAIN_AFTER = 3.0  # s without a radar after which it is worth the time to look for the reason
 KEEP_ALIVE = 1.0  # s between requests to a radar that is not measuring
 CHECK_PERIOD = 5.0  # s between checks for a reset while it measures
 CHECK_TIME = 0.020  # s that a check may take beside its bytes, with a slow adapter
@@ -143,6 +144,8 @@ class Connection:
         """Add to "no answer" what could be found out about the reason."""
         if not isinstance(error, (NoAnswerError, FrameError)) or len(self._radars) > 1:
             return error
+        if time.monotonic() < radar.well + EXPLAIN_AFTER:
+            return error  # it may be back sooner than all that was asked
         hint = self._other_sensor(radar)
         where = f"at address {radar.options.address} " if radar.options.address else ""
         rates = " or ".join(str(rate) for rate in self.baud_candidates(radar))
@@ -199,8 +202,14 @@ class Connection:
 
     def read_all(self, radar: Radar) -> None:
         """Read all settings that its model has; raises DriverError."""
-        radar.read_all(self._access.records(radar), settings_of(radar.known_model),
-                       self._note_of(radar))
+        settings = settings_of(radar.known_model)
+        for name, setting in [*settings.items()]:
+            if setting.section == RANGE_BOUND:  # which no manual promises
+                try:
+                    self._access.read_record(radar, record_of(setting), Location.RAM, attempts=1)
+                except (RefusedError, NoAnswerError):
+                    del settings[name]
+        radar.read_all(self._access.records(radar), settings, self._note_of(radar))
 
     def _note_of(self, radar: Radar) -> Note:
         return partial(self._listener.on_note, radar)

@@ -12,7 +12,14 @@ from driver_common.errors import FrameError, LinkError, NoAnswerError, RefusedEr
 from driver_common.flight_recorder import FlightRecorder
 from driver_common.serial_link import SerialLink
 from isys_radar_driver.commands import READ_DEVICE_NAME
-from isys_radar_driver.frames import FAILURE, MASTER, READ_RAW_SIGNALS, Frame, FrameParser
+from isys_radar_driver.frames import (
+    FAILURE,
+    MASTER,
+    MAX_GAP,
+    READ_RAW_SIGNALS,
+    Frame,
+    FrameParser,
+)
 
 T = TypeVar("T")
 
@@ -22,6 +29,7 @@ BYTE_GAP = 0.050  # s that a reply which has begun may pause
 BROADCAST_WINDOW = 0.060  # s in which further sensors may answer a broadcast
 GRACE = 0.5  # s in which pauses may add up until a reply is over in any case
 DAMAGED_ATTEMPTS = 5  # how often to ask a device that answers, but damaged
+DOUBT_TIME = 30.0  # s for which damage raises doubts
 OVERHEAD = 9  # bytes of an SD2 frame beside its PDU
 SMALLEST_FRAME = 6  # bytes; what is damaged and shorter is no reply but a glitch
 LONGEST_REPLY = 500  # bytes, of a target list
@@ -73,6 +81,11 @@ class Line:
         return self._link.baud_rate if self._link else 0
 
     @property
+    def in_doubt(self) -> bool:
+        """Whether what comes may be wrong behind a good checksum, because much arrives damaged."""
+        return time.monotonic() < self.damaged + DOUBT_TIME
+
+    @property
     def link(self) -> SerialLink:
         """The open port; raises LinkError where it is closed."""
         if self._link is None:
@@ -101,9 +114,14 @@ class Line:
             NoAnswerError: Nothing came in time.
             LinkError: The port failed.
         """
+        believed = not self.in_doubt  # else it may have understood another request
         while True:
             try:
                 return self._attempt(request, decode, timeout, sources)
+            except RefusedError:
+                if believed:
+                    raise
+                believed = True
             except NoAnswerError:
                 attempts -= 1
                 if attempts <= 0:
@@ -200,7 +218,8 @@ class Line:
                 yield frame, self.reply_began
             now = time.monotonic()
             if parser.pending + parser.dropped_bytes - dropped >= SMALLEST_FRAME:
-                deadline = now + BYTE_GAP
+                whole = not parser.pending and parser.damaged_frame is not None
+                deadline = now + (MAX_GAP if whole else BYTE_GAP)
             elif parser.pending:
                 deadline = max(deadline, now + BYTE_GAP)
             if now >= min(deadline, end):

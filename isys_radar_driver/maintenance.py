@@ -96,9 +96,12 @@ class Maintenance:
     def set_default_thresholds(self, radar: Radar) -> tuple[float, ...]:
         """Set the default temperature thresholds in the RAM, and read what they are then."""
         thresholds = self.execute(radar, commands.SET_DEFAULT_TEMPERATURE_THRESHOLDS)
-        radar.take_over(read_settings(self._access.records(radar), (
+        records = self._access.records(radar)
+        changed = read_settings(records, (
             setting for setting in radar.settings.values()
-            if setting.section == commands.TEMPERATURE_THRESHOLDS_SECTION)))
+            if setting.section == commands.TEMPERATURE_THRESHOLDS_SECTION))
+        radar.take_over(changed)
+        radar.read_other_views(records, changed)
         self._listener.on_values(radar)
         return thresholds
 

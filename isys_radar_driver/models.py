@@ -17,6 +17,7 @@ from driver_common.settings import suggestion
 from isys_radar_driver.targets import Resolution
 
 FAST, MULTI_TARGET = 0, 1  # measurement modes, table 12
+RANGE_BOUND = "I34"  # in place of a section: no revision of the manual has it, some firmware does
 
 
 class HasSection(Protocol):
@@ -72,6 +73,16 @@ class Model:
     def product_code(self) -> int:
         """The number that identifies the model (errata I23)."""
         return int(self.name.rpartition("-")[2])
+
+    @property
+    def measures_range(self) -> bool:
+        """Whether its targets have a range."""
+        return self.range_max > 0
+
+    @property
+    def measures_velocity(self) -> bool:
+        """Whether its targets have a velocity."""
+        return self.velocity_max > 0
 
     @property
     def has_target_lists(self) -> bool:
@@ -148,8 +159,8 @@ def _model_6xxx(name: str, sections: str = _600X, *, range_max: float = 20.0,
 
 
 MODELS: Mapping[str, Model] = MappingProxyType({model.name: model for model in (
-    _model_4xxx("iSYS-4001", _400X, 0.075, 0.100, range_max=150.0, velocity_max=70.0,
-                measures_angle=True),
+    _model_4xxx("iSYS-4001", _400X + RANGE_BOUND, 0.075, 0.100, range_max=150.0,
+                velocity_max=70.0, measures_angle=True),
     _model_4xxx("iSYS-4002", _400X, 0.075, 0.100, range_max=150.0, velocity_max=70.0,
                 measures_angle=True),
     _model_4xxx("iSYS-4003", _400X, 0.300, 0.330, range_max=50.0, velocity_max=12.5,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from sensor_msgs.msg import PointCloud2, Range, Temperature
-from std_msgs.msg import Float32MultiArray
+from std_msgs.msg import Bool, Float32MultiArray
 
 from driver_common import diagnostics
 from driver_common.device_node import FRAME_ID, TIME_OFFSET, DeviceNode, Topic, run
@@ -24,7 +25,12 @@ from isys_radar_driver.settings import ALL_SETTINGS
 from isys_radar_driver.targets import TargetList
 from msg_conversions.multi_array import to_float32_multi_array
 from msg_conversions.point_cloud import to_point_cloud
-from msg_conversions.range import to_range
+from msg_conversions.range import (
+    NO_ECHO_VALUES,
+    TOO_CLOSE_VALUES,
+    published_distance,
+    to_range,
+)
 from msg_conversions.temperature import to_temperature
 
 SIMULATED = "sim://"
@@ -32,11 +38,12 @@ POSITIVE_VELOCITY = {"approaching": -1, "receding": 1}  # to the sign of ROS (er
 POSITIVE_ANGLE = {"left": 1, "right": -1}  # errata I21
 RESOLUTIONS = {"auto": 0, "16": 16, "32": 32}
 MODEL_TOPICS = (
-    (commands.READ_RANGE_LIST, ("range", "temperature")),
+    (commands.READ_RANGE_LIST, ("range", "range_list", "temperature")),
     (commands.READ_DSP_TEMPERATURE, ("dsp_temperature", "rfe_temperature")),
     (commands.READ_DIGITAL_OUTPUTS, ("digital_outputs",)),
     (commands.READ_RAW, ("raw_signals",)),
 )
+RANGE_LIST_LABEL = ", ".join(field.name for field in dataclasses.fields(RangeList))
 PWM_STEP = 0.01  # m or m/s, table 35
 
 
@@ -77,8 +84,16 @@ class IsysRadarNode(DeviceNode, Listener):
                choices=POSITIVE_ANGLE,
                description="What the device means by a positive angle"),
         Option("publish_range_list", kind=bool, default=False, live=True,
-               description="Read the range list after every target list and publish ~/range and "
-                           "~/temperature (iSYS-6xxx)"),
+               description="Read the range list after every target list and publish ~/range, "
+                           "~/range_list and ~/temperature (iSYS-6xxx)"),
+        Option("field_of_view", kind=float, default=0.0, minimum=0.0, maximum=math.pi, unit="rad",
+               live=True, description="Opening angle in ~/range; 0 = along the x axis"),
+        Option("no_echo_value", kind=str, choices=dict.fromkeys(NO_ECHO_VALUES, 0),
+               default="inf", live=True, description="What ~/range says where nothing is seen "
+                                                     "up to its max_range; skip = nothing"),
+        Option("too_close_value", kind=str, choices=dict.fromkeys(TOO_CLOSE_VALUES, 0),
+               default="-inf", live=True, description="What ~/range says of something nearer "
+                                                      "than its min_range; skip = nothing"),
         Option("publish_digital_outputs", kind=bool, default=False, live=True,
                description="Read the digital outputs after every target list and publish them"),
         Option("new_address", kind=int, default=0, minimum=0, maximum=255, live=True,
@@ -86,7 +101,8 @@ class IsysRadarNode(DeviceNode, Listener):
     )
     ALL_SETTINGS = ALL_SETTINGS
     TOPICS: Mapping[str, Topic] = {
-        "points": Topic(PointCloud2), "range": Topic(Range), "temperature": Topic(Temperature),
+        "points": Topic(PointCloud2), "clipping": Topic(Bool), "range": Topic(Range),
+        "range_list": Topic(Float32MultiArray), "temperature": Topic(Temperature),
         "dsp_temperature": Topic(Temperature), "rfe_temperature": Topic(Temperature),
         "digital_outputs": Topic(Float32MultiArray), "raw_signals": Topic(Float32MultiArray)}
 
@@ -144,7 +160,8 @@ class IsysRadarNode(DeviceNode, Listener):
 
     def make_interfaces(self, sensor: str) -> None:
         """Create topics and services of a sensor."""
-        self._publishers_of[sensor] = {"points": self.add_publisher(sensor, "points")}
+        self._publishers_of[sensor] = {
+            name: self.add_publisher(sensor, name) for name in ("points", "clipping")}
         super().make_interfaces(sensor)
         for name, action in (
                 ("preview_save", self._preview_save),
@@ -188,26 +205,35 @@ class IsysRadarNode(DeviceNode, Listener):
                          "targets come from its other interfaces", warning=True)
 
     def on_target_list(self, radar: Radar, targets: TargetList, stamp: int) -> None:
-        """Publish the targets as points."""
-        sensor = radar.options.name
-        angle_sign = POSITIVE_ANGLE[self.option("positive_angle", sensor)]
-        velocity_sign = POSITIVE_VELOCITY[self.option("positive_velocity", sensor)]
+        """Publish the targets as points; what the model does not measure is NaN, its angle 0."""
+        sensor, model = radar.options.name, radar.known_model
+        range_sign = 1.0 if model.measures_range else math.nan
+        angle_sign = (POSITIVE_ANGLE[self.option("positive_angle", sensor)]
+                      if model.measures_angle else 0.0)
+        velocity_sign = (POSITIVE_VELOCITY[self.option("positive_velocity", sensor)]
+                         if model.measures_velocity else math.nan)
         self._publish(radar, "points", to_point_cloud(
-            [(target.range, angle_sign * target.angle, velocity_sign * target.velocity,
-              target.signal) for target in targets.targets],
+            [(range_sign * target.range, angle_sign * target.angle,
+              velocity_sign * target.velocity, target.signal) for target in targets.targets],
             *self._frame_and_stamp(radar, stamp)))
+        self._publish(radar, "clipping", Bool(data=targets.clipping))
 
     def on_range_list(self, radar: Radar, values: RangeList, targets: TargetList,
                       stamp: int) -> None:
-        """Publish range and temperature; without a target the range list says 0 m."""
-        assert radar.model is not None
-        where = self._frame_and_stamp(radar, stamp)
-        distance = values.range
+        """Publish range, temperature and the rest; without a target the range list says 0 m."""
+        sensor, where = radar.options.name, self._frame_and_stamp(radar, stamp)
+        limits = 0.0, radar.known_model.range_max
+        measured = values.range
         if not targets.targets:
-            distance = math.nan if targets.clipping else math.inf  # REP-117: unknown, nothing seen
-        self._publish(radar, "range", to_range(
-            distance, (0.0, radar.model.range_max), 0.0, *where))
+            measured = math.nan if targets.clipping else math.inf  # REP-117: unknown, nothing seen
+        distance = published_distance(measured, limits, self.option("no_echo_value", sensor),
+                                      self.option("too_close_value", sensor))
+        if distance is not None:
+            self._publish(radar, "range", to_range(
+                distance, limits, self.option("field_of_view", sensor), *where))
         self._publish(radar, "temperature", to_temperature(values.temperature, *where))
+        self._publish(radar, "range_list", to_float32_multi_array(
+            np.array(dataclasses.astuple(values), np.float32), [RANGE_LIST_LABEL]))
         radar.temperatures["sensor"] = values.temperature
 
     def on_digital_outputs(self, radar: Radar, values: tuple[int, ...], stamp: int) -> None:

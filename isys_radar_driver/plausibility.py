@@ -84,6 +84,10 @@ class Limits:
                     return f"a {name} of {value:g} is beyond {low:g} … {high:g}"
         return ""
 
+    def allow_range(self, distance: float) -> bool:
+        """Whether a range in m can be true."""
+        return self.lowest.range <= distance <= self.highest.range
+
 
 class _Entry(NamedTuple):
     """A list that was seen: when, its targets, and how fast their values change."""

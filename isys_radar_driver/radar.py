@@ -5,19 +5,19 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from driver_common.device import Device, DeviceOptions
 from driver_common.errors import NoAnswerError
 from driver_common.serial_link import BITS_PER_BYTE
-from driver_common.settings import RecordAccess, Value
+from driver_common.settings import RecordAccess, Value, read_settings
 from isys_radar_driver.commands import Version
 from isys_radar_driver.frames import BROADCAST
 from isys_radar_driver.line import OVERHEAD
 from isys_radar_driver.models import FAST, Model
 from isys_radar_driver.plausibility import Continuity, Limits
-from isys_radar_driver.settings import record_of
+from isys_radar_driver.settings import OTHER_VIEW, coarser_first, record_of
 from isys_radar_driver.targets import TARGET_SIZES, Resolution
 
 RATE_WINDOW = 5.0  # s over which the rate is measured
@@ -103,6 +103,7 @@ class Radar(Device):
         unchecked: Settings of a radar that came back, which may have changed meanwhile.
         absent: Names of optional readings that it does not have.
         answered: Monotonic time in s of its last good answer.
+        well: Monotonic time in s of its last step without a fault.
         temperatures: Board temperatures in °C, by name.
         measuring: Whether acquisition was started; None while that is not known.
         cycle_end: Monotonic time in s at which one of its cycles ended, as far as known.
@@ -130,6 +131,7 @@ class Radar(Device):
         self.unchecked: list[str] = []
         self.absent: set[str] = set()
         self.answered = 0.0
+        self.well = -math.inf
         self.temperatures: dict[str, float] = {}
         self.measuring: bool | None = False
         self.statistics = Statistics()
@@ -169,9 +171,22 @@ class Radar(Device):
 
     def write(self, access: RecordAccess, changes: Mapping[str, Value]) -> dict[str, Value]:
         """Write settings, see `Device.write`; some are stored for good at once."""
-        reported = super().write(access, changes)
+        reported = super().write(access, {name: changes[name] for name in coarser_first(changes)})
         self.unsaved -= {name for name in changes
                          if record_of(self.settings[name]).stored_at_once}
+        return reported | self.read_other_views(access, changes)
+
+    def read_other_views(self, access: RecordAccess, names: Iterable[str]) -> dict[str, Value]:
+        """Read what the other views of changed boundaries show now; it is not wanted any more."""
+        others = {OTHER_VIEW[name] for name in names if name in OTHER_VIEW}.difference(names)
+        reported = read_settings(access, (
+            self.settings[name] for name in sorted(others & self.settings.keys())))
+        changed = {name: value for name, value in reported.items()
+                   if value != self.options.wanted.get(name, value)}
+        for name in changed:
+            del self.options.wanted[name]
+            self.differing.pop(name, None)
+        self.values |= reported
         return reported
 
     @property

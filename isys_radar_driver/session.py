@@ -24,7 +24,7 @@ from isys_radar_driver.maintenance import Maintenance
 from isys_radar_driver.radar import Options, Radar
 from isys_radar_driver.targets import TargetList
 
-DAMAGED_TIME = 5.0  # s without a good answer after which what arrives is not the radar's
+PATIENCE = 5.0  # s since a good step for which a radar with a bad line is not lost
 
 
 class Listener(device_bus.Listener[Radar]):
@@ -118,6 +118,7 @@ class RadarBus(DeviceBus[Radar]):
 
     def _attend(self, radar: Radar) -> None:
         """Measure, or look whether the radar is there."""
+        begin = time.monotonic()
         try:
             if radar.measuring != self.wants(radar):
                 self.acquisition.start_or_stop(radar)  # it did not work when it was asked for
@@ -128,23 +129,27 @@ class RadarBus(DeviceBus[Radar]):
             else:
                 self.connection.keep_alive(radar)
             radar.refused = 0
+            radar.well = time.monotonic()
             self._note_well(radar)
         except (RefusedError, NoAnswerError, FrameError) as error:
             if not radar.is_connected:  # it could not be configured again
                 raise
             if isinstance(error, RefusedError):
                 self._note_refusal(radar, error)
-            elif isinstance(error, FrameError):
-                self._note_damage(radar, error)
             else:
-                radar.statistics.timeouts += 1
-                self._note_miss(radar, error)
+                self._note_failure(radar, error, begin)
 
-    def _note_damage(self, radar: Radar, error: FrameError) -> None:
-        """Ask a radar again whose answer arrived damaged: it is there, as long as some are good."""
-        radar.statistics.damaged_replies += 1
-        if time.monotonic() < radar.answered + DAMAGED_TIME:
-            radar.misses = 0
+    def _note_failure(self, radar: Radar, error: NoAnswerError | FrameError,
+                      begin: float) -> None:
+        """Ask a radar again whose answer did not come, or arrived damaged.
+
+        One that sends good lists now and then is there, as long as it answers something.
+        """
+        damaged = isinstance(error, FrameError)
+        radar.statistics.damaged_replies += damaged
+        radar.statistics.timeouts += not damaged
+        if time.monotonic() < radar.well + PATIENCE and (damaged or radar.answered > begin):
+            radar.misses = int(not damaged)  # after a silence a setting is looked at
         else:
             self._note_miss(radar, error)
 

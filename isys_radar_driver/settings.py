@@ -7,12 +7,12 @@ about a setting is written down anywhere else.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import KW_ONLY, dataclass
 
 from driver_common.settings import Setting
 from isys_radar_driver.commands import READ_APPLICATION, READ_SENSOR, IsysRecord
-from isys_radar_driver.models import Model
+from isys_radar_driver.models import RANGE_BOUND, Model
 
 RecordOf = Callable[[int], IsysRecord]
 
@@ -58,6 +58,8 @@ class Row:
         instances: Numbers for which the row stands.
         limit: Attribute of the model that holds the largest value.
         read_only_for: Models on which the setting can only be read.
+        choices_lacking: Choices that models do not have: word to the beginning of their names.
+        view_of: Name of another row that shows the same boundary, more coarsely (N15).
         more: What else the `Setting` gets.
     """
 
@@ -69,6 +71,8 @@ class Row:
     instances: tuple[int, ...] = (1,)
     limit: str = ""
     read_only_for: tuple[str, ...] = ()
+    choices_lacking: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    view_of: str = ""
     more: Mapping[str, object] = dataclasses.field(default_factory=dict)
 
     def settings(self, model: Model | None) -> list[Setting]:
@@ -77,10 +81,22 @@ class Row:
         if model is not None:
             if self.limit:
                 more["maximum"] = getattr(model, self.limit)
-            more["read_only"] = model.name in self.read_only_for
+            if self.choices_lacking:
+                more["choices"] = {word: code for word, code in self.choices.items()
+                                   if not model.name.startswith(
+                                       self.choices_lacking.get(word, "nothing"))}
+            only_value = self.limit and more.get("minimum") == more["maximum"]
+            more["read_only"] = bool(only_value) or model.name in self.read_only_for
         return [Setting(self.name.format(n=n), self.record(n), section=self.section,
                         description=self.description.format(n=n), **more)  # type: ignore[arg-type]
                 for n in self.instances]
+
+    @property
+    def choices(self) -> Mapping[str, int]:
+        """Its choices on any model."""
+        choices = self.more.get("choices", {})
+        assert isinstance(choices, dict)
+        return choices
 
 
 OUTPUTS = (1, 2, 3)
@@ -110,6 +126,9 @@ ROWS = (
         "Fast with a single target, or slower with many",
         read_only_for=("iSYS-6004", "iSYS-6005"),
         more={**_choices("fast", "multi_target"), **_STOPPED}),
+    Row("range_bound", _sensor(0x0010, "H"), RANGE_BOUND,
+        "Largest range that is measured, where the firmware can choose",
+        more={**_choices("50_m", "150_m"), **_STOPPED}),
     Row("threshold_sensitivity.left_db", _sensor(0x0016, "h"), "3.3.4.5",
         "Threshold sensitivity of the left FFT side", more=_THRESHOLD),
     Row("threshold_sensitivity.right_db", _sensor(0x0017, "h"), "3.3.4.5",
@@ -140,7 +159,8 @@ ROWS = (
         "Rise of the threshold around that frequency (filter {n})", instances=PAIR,
         more={"field": 2, "maximum": 1000.0, **_DB}),
     Row("output{n}.mode", _output(0x00, "H"), "3.3.5.2", "What digital output {n} shows",
-        instances=OUTPUTS, more=_choices("disabled", "digital", "pwm")),
+        instances=OUTPUTS, choices_lacking={"pwm": "iSYS-6"},
+        more=_choices("disabled", "digital", "pwm")),
     Row("output{n}.rising_delay_cycles", _output(0x01, "H"), "3.3.5.3",
         "Cycles in which a target must be seen before it is reported (output {n})",
         instances=OUTPUTS),
@@ -191,10 +211,10 @@ ROWS = (
         more={"unit": "%", "minimum": 1, "maximum": 100}),
     Row("output{n}.range_min_extended", _output(0x19, "h"), "3.3.5.14",
         "Smallest range of the detection area in fine steps (output {n})", instances=OUTPUTS,
-        limit="range_max", more=_CENTIMETRES),
+        limit="range_max", view_of="output{n}.range_min", more=_CENTIMETRES),
     Row("output{n}.range_max_extended", _output(0x1A, "h"), "3.3.5.14",
         "Largest range of the detection area in fine steps (output {n})", instances=OUTPUTS,
-        limit="range_max", more=_CENTIMETRES),
+        limit="range_max", view_of="output{n}.range_max", more=_CENTIMETRES),
     Row("mounting_offset", _application(0x0506, "I"), "3.3.5.15",
         "Distance that is subtracted from every range", more={"unit": "m", "factor": 0.001}),
     Row("amplifier_potentiometer", _application(0x0680, "H"), "3.3.5.16",
@@ -209,7 +229,8 @@ ROWS = (
         "What output {n} warns of", instances=PAIR,
         more=_choices("temperature", "range", first=1)),  # errata I11
     Row("output{n}.temperature_warning_celsius", _warning(0x070A, "h"), "3.3.5.19",
-        "Temperature at which output {n} warns", instances=PAIR, more=_CELSIUS),
+        "Temperature at which output {n} warns", instances=PAIR,
+        view_of="output{n}.temperature_threshold_celsius", more=_CELSIUS),
     Row("output{n}.range_warning", _warning(0x070B, "I"), "3.3.5.20",
         "Range at which output {n} warns", instances=PAIR, more={"unit": "m", "factor": 0.0001}),
     Row("moving_target_sensitivity.near_db", _application(0x0828, "h", has_location=True),
@@ -239,6 +260,11 @@ ROWS = (
 ALL_SETTINGS: Mapping[str, Setting] = {
     setting.name: setting for row in ROWS for setting in row.settings(None)}
 
+_COARSER = {row.name.format(n=n): row.view_of.format(n=n)
+            for row in ROWS if row.view_of for n in row.instances}
+OTHER_VIEW: Mapping[str, str] = _COARSER | {
+    coarser: name for name, coarser in _COARSER.items()}  # of one boundary, by name
+
 _THRESHOLDS = (0x000B, 0x0016, 0x0017)  # application settings all the same (errata I16)
 
 
@@ -246,6 +272,11 @@ def settings_of(model: Model) -> dict[str, Setting]:
     """Return the settings that a model has, by name, with the model's limits."""
     return {setting.name: setting for row in ROWS if row.section in model.sections
             for setting in row.settings(model)}
+
+
+def coarser_first(names: Iterable[str]) -> list[str]:
+    """Return names of settings with the finer view of a boundary behind the other, so it counts."""
+    return sorted(names, key=lambda name: name in _COARSER)
 
 
 def record_of(setting: Setting) -> IsysRecord:

@@ -22,7 +22,8 @@ def to_point_cloud(targets: Sequence[Polar], frame_id: str, stamp: int) -> Point
 
     Args:
         targets: Per target: range in m, azimuth in rad (positive to the left), radial velocity in
-            m/s (positive = moving away) and intensity in dB. The elevation is 0.
+            m/s (positive = moving away) and intensity in dB. The elevation is 0. What is not
+            measured is NaN; without a range there is no position either.
         frame_id: Frame of the sensor.
         stamp: Time of measurement in ns since the epoch.
     """
@@ -31,6 +32,7 @@ def to_point_cloud(targets: Sequence[Polar], frame_id: str, stamp: int) -> Point
     points = np.zeros((len(polar), len(FIELD_NAMES)), dtype="<f4")
     points[:, 0] = distance * np.cos(azimuth)
     points[:, 1] = distance * np.sin(azimuth)
+    points[:, 2] = 0.0 * distance
     points[:, 3] = intensity
     points[:, 4] = distance
     points[:, 5] = azimuth
@@ -38,4 +40,4 @@ def to_point_cloud(targets: Sequence[Polar], frame_id: str, stamp: int) -> Point
     return PointCloud2(
         header=to_header(frame_id, stamp), height=1, width=len(points), fields=FIELDS,
         is_bigendian=False, point_step=POINT_STEP, row_step=POINT_STEP * len(points),
-        data=points.tobytes(), is_dense=True)
+        data=points.tobytes(), is_dense=not np.isnan(distance).any())

@@ -26,6 +26,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--address", default="", metavar="N[,N]",
                         help="address of each radar (default: the model's)")
     parser.add_argument("--baud", type=int, default=0, help="baud rate (default: the model's)")
+    parser.add_argument("--range-bound", action="store_true",
+                        help="its firmware has the setting range_bound (iSYS-4001)")
     add_line_arguments(parser)
 
 
@@ -33,7 +35,7 @@ def open_simulation(options: argparse.Namespace) -> Simulation:
     """Start the radars; raises DriverError."""
     line, radars = simulated_line(
         options.model.split(","), numbers(options.address, "--address"), baud_rate=options.baud,
-        link=options.link, listen=options.listen)
+        link=options.link, listen=options.listen, range_bound=options.range_bound)
     line.faults.echo = options.echo
     set_faults(line.faults, LINE_FAULTS, options)
     line.start()
@@ -46,5 +48,5 @@ def open_simulation(options: argparse.Namespace) -> Simulation:
     return Simulation(
         f"{options.link or line.port}: {names}",
         {**{name.replace("_", "-"): switch(radars, name)
-            for name in ("silent", "clipping", "strict", "self_starting")},
+            for name in ("silent", "clipping", "strict", "self_starting", "bare", "nonsense")},
          "power-cycle": power_cycle, **fault_commands(line.faults, LINE_FAULTS)}, line.close)

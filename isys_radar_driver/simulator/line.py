@@ -65,7 +65,8 @@ def _collision(frames: Sequence[bytes]) -> bytes:
 
 
 def simulated_line(models: Sequence[str], addresses: Sequence[int] = (), *, baud_rate: int = 0,
-                   link: str = "", listen: str = "") -> tuple[SimulatedLine, list[SimulatedRadar]]:
+                   link: str = "", listen: str = "", range_bound: bool = False,
+                   ) -> tuple[SimulatedLine, list[SimulatedRadar]]:
     """Return a line with one radar per address (or model), not yet started.
 
     Raises:
@@ -81,7 +82,7 @@ def simulated_line(models: Sequence[str], addresses: Sequence[int] = (), *, baud
         raise SettingError(f"{baud_rate} is no baud rate")
     count = max(len(models), len(addresses))
     padded = [*models, *[models[-1]] * (count - len(models))]
-    radars = [SimulatedRadar(find_model(name), address, serial_number=index + 1)
+    radars = [SimulatedRadar(find_model(name), address, index + 1, range_bound=range_bound)
               for index, (name, address) in enumerate(
                   zip(padded, [*addresses, *[0] * (count - len(addresses))], strict=True))]
     line = SimulatedLine(SimulatedRadars(radars, baud_rate), link=link, listen=listen)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import fnmatch
+import itertools
 import math
 import statistics
 import struct
@@ -27,7 +29,7 @@ from isys_radar_driver.frames import (
     Frame,
 )
 from isys_radar_driver.models import FAST, Model
-from isys_radar_driver.settings import is_application_setting, settings_of
+from isys_radar_driver.settings import OTHER_VIEW, is_application_setting, settings_of
 from isys_radar_driver.simulator.scene import scene_of
 from isys_radar_driver.targets import (
     FIXED_LENGTH,
@@ -40,6 +42,7 @@ from isys_radar_driver.targets import (
 TURNAROUND = 0.001  # s from the end of a request to the reply
 BOOT_TIME = 0.5  # s without answers after power-on
 FIXED_TARGETS = 10  # length of a fixed-length list; the manual leaves it to the data sheet
+MAX_DELAY = 1000  # cycles that rising and falling delays look back
 RAW_SIGNAL_COUNT, RAW_SAMPLES, RAW_SAMPLE_TIME_US = 4, 512, 25
 
 # Factory values by name pattern; the first that matches counts, 0 or the minimum otherwise.
@@ -53,13 +56,23 @@ _FACTORY: Sequence[tuple[str, Value]] = (
     ("ip_destination.address", "192.168.60.30"), ("ip_destination.target_list_port", 2050),
     ("ip_destination.record_port", 2048), ("target_list_interface", "ethernet"),
     ("output1.temperature_threshold_celsius", 55.0),
-    ("output2.temperature_threshold_celsius", 60.0), ("*.temperature_warning_celsius", 55.0),
+    ("output2.temperature_threshold_celsius", 60.0), ("output1.temperature_warning_celsius", 55.0),
+    ("output2.temperature_warning_celsius", 60.0), ("range_bound", "150_m"),
     ("moving_target_sensitivity.*", 3.0), ("target_clustering", True),
 )
 
 _SINGLE_VALUE: Mapping[str, Callable[[list[float]], float]] = {
     "mean": statistics.fmean, "median": statistics.median_low,
     "min": lambda values: min(values), "max": lambda values: max(values)}
+
+# What cannot be true of a list, for any model that measures it.
+_NONSENSE: Sequence[Callable[[TargetList], TargetList]] = (
+    lambda measured: dataclasses.replace(measured, output=measured.output % 3 + 1),
+    lambda measured: dataclasses.replace(measured, targets=(Target(40.0, 0.0, -5.0, 0.0),)),
+    lambda measured: dataclasses.replace(measured, targets=(Target(40.0, 0.0, 2000.0, 0.0),)),
+    lambda measured: dataclasses.replace(measured, targets=(Target(300.0, 0.0, 1.0, 0.0),)),
+)
+
 
 class Refusal(Exception):  # noqa: N818
     """The radar answers with a failure."""
@@ -78,10 +91,20 @@ class SimulatedRadar:
         silent: Whether it does not answer.
         strict: Whether it refuses a start while it measures, and a stop while it does not.
         self_starting: Whether it measures from power-on, without being told.
+        bare: Whether it stays silent where a driver can do without an answer.
+        nonsense: Whether its target lists say what cannot be true, behind a good checksum.
     """
 
-    def __init__(self, model: Model, address: int = 0, serial_number: int = 1) -> None:
-        """Power it on with factory settings."""
+    def __init__(self, model: Model, address: int = 0, serial_number: int = 1, *,
+                 range_bound: bool = False) -> None:
+        """Power it on with factory settings.
+
+        Args:
+            model: Its model.
+            address: Its address; 0 = that of the model.
+            serial_number: Its serial number.
+            range_bound: Whether its firmware has the setting of this name, if its model can.
+        """
         self.model = model
         self.address = address or model.address
         self.serial_number = serial_number
@@ -91,9 +114,13 @@ class SimulatedRadar:
         self.silent = False
         self.strict = False
         self.self_starting = False
+        self.bare = False
+        self.nonsense = False
         self.temperature = 41.5
         self.measuring = False
         self.settings = settings_of(model)
+        if not range_bound:
+            self.settings.pop("range_bound", None)
         self._fields: dict[IsysRecord, dict[int, Setting]] = {}
         for setting in self.settings.values():
             record = cast(IsysRecord, setting.record)
@@ -104,6 +131,7 @@ class SimulatedRadar:
         self.eeprom = dict(self.ram)
         self.started = 0.0
         self._ready = 0.0
+        self._nonsense = itertools.cycle(_NONSENSE)
 
     # --- for tests and people ---
 
@@ -122,7 +150,10 @@ class SimulatedRadar:
 
     def set_value(self, name: str, value: Value) -> None:
         """Change a setting in the RAM, behind the driver's back."""
-        setting = self.settings[name]
+        self._store(self.settings[name], value)
+        self._show_in_other_view(self.settings[name])
+
+    def _store(self, setting: Setting, value: Value) -> None:
         record = cast(IsysRecord, setting.record)
         raws = list(self.ram[record])
         raws[setting.field] = setting.encode(value)
@@ -132,7 +163,7 @@ class SimulatedRadar:
 
     def reply(self, request: Frame, now: float) -> tuple[float, Frame] | None:
         """Return the reply to a request and the monotonic time at which it begins."""
-        if self.silent or now < self._ready:
+        if self.silent or now < self._ready or (self.bare and _is_optional(request)):
             return None
         due = now + TURNAROUND
         delimiter = Delimiter.SD2
@@ -232,10 +263,24 @@ class SimulatedRadar:
         values = record.unpack(rest)
         for index, setting in self._fields[record].items():
             self._check(setting, values[index])
+        changed = [setting for index, setting in self._fields[record].items()
+                   if values[index] != self.ram[record][index]]
         self.ram[record] = values
+        for setting in changed:
+            self._show_in_other_view(setting)
         if location is Location.EEPROM or record.stored_at_once:
             self.eeprom[record] = values
         return b""
+
+    def _show_in_other_view(self, setting: Setting) -> None:
+        """Have the other setting of the same boundary, if any, show the new value (N15)."""
+        other = self.settings.get(OTHER_VIEW.get(setting.name, ""))
+        if other is not None:
+            value, (low, high) = self.value(setting.name), other.limits
+            assert isinstance(value, float)
+            assert low is not None
+            assert high is not None
+            self._store(other, min(max(value, low), high))
 
     def _check(self, setting: Setting, raw: Raw) -> None:
         """Refuse what is out of range, not possible now, or beyond its own other limit."""
@@ -275,9 +320,11 @@ class SimulatedRadar:
         targets = self.targets(output, self._wall_time(now))
         fixed = FIXED_TARGETS if resolution.fixed_length else 0
         limit = fixed or self.model.max_targets.get(self._mode, 1)
-        return encode_target_list(
-            TargetList(output, () if self.clipping else tuple(targets[:limit]), self.clipping),
-            resolution, self.model.range_step_16, fixed)
+        measured = TargetList(output, () if self.clipping else tuple(targets[:limit]),
+                              self.clipping)
+        if self.nonsense:
+            measured = next(self._nonsense)(measured)
+        return encode_target_list(measured, resolution, self.model.range_step_16, fixed)
 
     @staticmethod
     def _list_request(pdu: bytes) -> tuple[int, Resolution]:
@@ -304,7 +351,9 @@ class SimulatedRadar:
         targets = self.targets(number, now)
         mode = self.value(f"output{number}.mode")
         if mode == "pwm" and targets:
-            return round(min(target.range for target in targets) * 100)
+            nearest = min(targets, key=lambda target: target.range)
+            by_velocity = self.value(f"output{number}.filter_signal") == "velocity"
+            return round((nearest.velocity if by_velocity else nearest.range) * 100)
         closed = self.value(f"output{number}.contact") == "normally_closed"
         return int((mode == "digital" and bool(targets)) != closed)
 
@@ -347,9 +396,34 @@ class SimulatedRadar:
 
     def targets(self, output: int, now: float) -> list[Target]:
         """Return the targets which an output's filter lets through, at a time since the epoch."""
-        def limits(what: str) -> tuple[float, float]:
-            pair = [self.settings.get(f"output{output}.{what}".format(end)) for end in
-                    ("min", "max")]
+        rising, falling = (cast(int, self.value(f"output{output}.{edge}_delay_cycles"))
+                           if f"output{output}.{edge}_delay_cycles" in self.settings else 0
+                           for edge in ("rising", "falling"))
+        passed = self._filtered(output, now)
+        if rising or falling:
+            passed = self._delayed(output, now, rising, falling)
+        return self._single_target(output, [target for target in passed if target is not None])
+
+    def _delayed(self, output: int, now: float, rising: int, falling: int) -> list[Target | None]:
+        """Report what was seen in enough cycles, and until it was not for enough (3.3.5.3)."""
+        cycle_time = self.model.cycle_time(self._mode)
+        reported: dict[int, Target] = {}
+        seen: dict[int, int] = {}  # cycles in a row, negative where it was not seen
+        for cycle in range(min(MAX_DELAY, 2 * (rising + falling) + 1), -1, -1):
+            for index, target in enumerate(self._filtered(output, now - cycle * cycle_time)):
+                before = seen.get(index, 0)
+                seen[index] = max(before, 0) + 1 if target else min(before, 0) - 1
+                if target and (index in reported or seen[index] >= rising):
+                    reported[index] = target
+                elif -seen[index] >= falling:
+                    reported.pop(index, None)
+        return [*reported.values()]
+
+    def _filtered(self, output: int, now: float) -> list[Target | None]:
+        """Return the targets of a cycle, None for those which the limits do not let through."""
+        def limits(what: str, more: str = "") -> tuple[float, float]:
+            pair = [self.settings.get(f"output{output}.{what.format(end)}{more}")
+                    for end in ("min", "max")]
             low, high = (cast(float, self.value(setting.name)) if setting else default
                          for setting, default in zip(pair, (-math.inf, math.inf), strict=True))
             return low, high
@@ -357,17 +431,22 @@ class SimulatedRadar:
         def within(value: float, pair: tuple[float, float]) -> bool:
             return pair[0] <= value <= pair[1]
 
-        ranges, signals = limits("range_{}"), limits("signal_{}_db")
-        velocities = limits("velocity_{}")
+        fine = f"output{output}.range_min_extended" in self.settings
+        ranges = limits("range_{}", "_extended" if fine else "")
+        signals, velocities = limits("signal_{}_db"), limits("velocity_{}")
         direction = (self.value(f"output{output}.direction")
                      if f"output{output}.direction" in self.settings else "both")
+        offset = (cast(float, self.value("mounting_offset"))
+                  if "mounting_offset" in self.settings else 0.0)
+
         def on_course(target: Target) -> bool:
             return direction == "both" or (target.velocity > 0) == (direction == "approaching")
 
-        return self._single_target(output, [
-            target for target in self.scene(now)
-            if within(target.range, ranges) and within(target.signal, signals)
-            and within(abs(target.velocity), velocities) and on_course(target)])
+        measured = [target._replace(range=target.range - offset) for target in self.scene(now)
+                    if target.range <= self._farthest]
+        return [target if within(target.range, ranges) and within(target.signal, signals)
+                and within(abs(target.velocity), velocities) and on_course(target) else None
+                for target in measured]
 
     def _single_target(self, output: int, targets: list[Target]) -> list[Target]:
         signal = self.value(f"output{output}.filter_signal")
@@ -381,6 +460,12 @@ class SimulatedRadar:
         wanted = _SINGLE_VALUE[str(kind)](values)
         nearest = min(targets, key=lambda target: abs(getattr(target, attribute) - wanted))
         return [nearest._replace(**{attribute: wanted})]
+
+    @property
+    def _farthest(self) -> float:
+        """Range in m beyond which it measures nothing."""
+        bound = self.value("range_bound") if "range_bound" in self.settings else ""
+        return 50.0 if bound == "50_m" else math.inf
 
     # --- helpers ---
 
@@ -433,3 +518,12 @@ class SimulatedRadar:
         0xDB: _read_digital_outputs, 0xDF: _eeprom_function,
         READ_RAW_SIGNALS: _read_raw_signals, 0xE1: _read_range_list,
     }
+
+
+def _is_optional(request: Frame) -> bool:
+    """Whether a driver can do without the answer."""
+    return (request.function_code, request.pdu) in {
+        (command.function_code, command.sub_function) for command in (
+            commands.READ_DSP_HARDWARE_VERSION, commands.READ_RFE_HARDWARE_VERSION,
+            commands.READ_BOOTLOADER_VERSION, commands.READ_DSP_TEMPERATURE,
+            commands.READ_RFE_TEMPERATURE)}

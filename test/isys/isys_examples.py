@@ -551,6 +551,11 @@ HAND_TYPED = (
             Write(100, {"measurement_mode": "multi_target"})),
     Example("table 12", "68 05 05 68 01 64 D2 00 01 38 16",
             Values(100, {"measurement_mode": "multi_target"})),
+    # The range bound, which the manual does not have (field note N13).
+    Example("I34", "68 05 05 68 80 01 D2 00 10 63 16", Read(128, ("range_bound",))),
+    Example("I34", "68 05 05 68 01 80 D2 00 01 54 16", Values(128, {"range_bound": "150_m"})),
+    Example("I34", "68 07 07 68 80 01 D3 00 10 00 01 65 16",
+            Write(128, {"range_bound": "150_m"})),
     Example("table 10", "68 05 05 68 80 01 D2 00 17 6A 16",
             Read(128, ("threshold_sensitivity.right_db",))),
     Example("table 10", "68 05 05 68 01 80 D2 FF 9C EE 16",

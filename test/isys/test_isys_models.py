@@ -21,7 +21,7 @@ ISYS_6003 = EVERY_MODEL + """
     3.3.4.3 3.3.4.4 3.3.5.2 3.3.5.3 3.3.5.4 3.3.5.5 3.3.5.7 3.3.5.8 3.3.5.11 3.3.5.12 3.3.5.13
     3.3.5.14 3.3.7 3.3.9.1 3.3.9.2 3.3.10 3.3.11"""
 SUPPORTED = {
-    "iSYS-4001": ISYS_4001,
+    "iSYS-4001": ISYS_4001 + " I34",  # some firmware has this one
     "iSYS-4002": ISYS_4001,
     "iSYS-4003": ISYS_4001,
     "iSYS-4004": EVERY_MODEL + """
@@ -113,6 +113,7 @@ SETTINGS = {
     "3.3.4.2": "frequency_channel",
     "3.3.4.3": "threshold_minimum_db",
     "3.3.4.4": "measurement_mode",
+    "I34": "range_bound",
     "3.3.4.5": "threshold_sensitivity.left_db threshold_sensitivity.right_db",
     "3.3.4.6": "ip.address ip.subnet_mask ip.gateway",
     "3.3.4.7": "ip_destination.address ip_destination.target_list_port ip_destination.record_port",
@@ -193,10 +194,20 @@ def test_a_model_has_the_settings_of_its_sections(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", SUPPORTED)
-def test_only_the_measurement_mode_of_two_models_is_read_only(name: str) -> None:
+def test_what_can_only_be_read(name: str) -> None:
     read_only = {setting.name for setting in settings_of(MODELS[name]).values()
                  if setting.read_only}
-    assert read_only == ({"measurement_mode"} if name in ("iSYS-6004", "iSYS-6005") else set())
+    expected = {"measurement_mode"} if name in ("iSYS-6004", "iSYS-6005") else set()
+    if name.startswith("iSYS-6"):  # one channel, section 3.3.4.2
+        expected |= {"frequency_channel"}
+    assert read_only == expected
+
+
+@pytest.mark.parametrize("name", SUPPORTED)
+def test_an_output_is_a_pwm_on_4xxx_only(name: str) -> None:  # table 15
+    settings = settings_of(MODELS[name])
+    if "output2.mode" in settings:
+        assert ("pwm" in settings["output2.mode"].choices) == name.startswith("iSYS-4")
 
 
 @pytest.mark.parametrize(("name", "link"), LINK.items(), ids=LINK)

@@ -14,7 +14,7 @@ import pytest
 from isys_master import FAST_LINE, Lab
 from nodes import NodeProcess, Ros
 from sensor_msgs.msg import PointCloud2, Range, Temperature
-from std_msgs.msg import Float32MultiArray
+from std_msgs.msg import Bool, Float32MultiArray
 
 from driver_common import diagnostics
 from isys_radar_driver.commands import READ_APPLICATION, Location
@@ -23,7 +23,6 @@ from isys_radar_driver.models import find_model
 from isys_radar_driver.node import IsysRadarNode
 from isys_radar_driver.radar import Identity, Options, Radar
 from isys_radar_driver.session import Listener, RadarBus
-from isys_radar_driver.settings import settings_of
 from isys_radar_driver.targets import Target
 
 MODULE = "isys_radar_driver.node"
@@ -124,7 +123,7 @@ def of_each_kind():
                     "-r", f"__node:={name}"))
                 process.wait_for_line("connected to")
                 stations[model] = Station(ros, f"/{name}", process, line, radar)
-                settings = settings_of(radar.model).keys()
+                settings = radar.settings.keys()
                 ros.wait_until(lambda: settings <= stations[model].remote.names())
             return stations[model]
 
@@ -136,7 +135,7 @@ def of_each_kind():
 @pytest.mark.parametrize("model", ["iSYS-4001", "iSYS-5110", "iSYS-6005"])
 def test_the_parameters_are_those_of_the_model_with_what_it_reported(of_each_kind, model):
     here = of_each_kind(model)
-    settings = settings_of(find_model(model))
+    settings = here.radar.settings
     options = {option.name for option in (*IsysRadarNode.bus_options(),
                                           *IsysRadarNode.SENSOR_OPTIONS)}
     of_ros = ("qos_overrides.", "use_sim_time", "start_type_description_service")
@@ -149,7 +148,7 @@ def test_the_parameters_are_those_of_the_model_with_what_it_reported(of_each_kin
 @pytest.mark.parametrize("model", ["iSYS-4001", "iSYS-5110", "iSYS-6005"])
 def test_descriptors_say_what_the_rows_say(of_each_kind, model):
     here = of_each_kind(model)
-    settings = settings_of(find_model(model))
+    settings = here.radar.settings
     for setting, descriptor in zip(settings.values(), here.remote.describe(*settings),
                                    strict=True):
         assert descriptor.description.startswith(setting.description)
@@ -494,8 +493,23 @@ def test_a_clipping_receiver_gives_an_empty_cloud(shared):
         "shared: radar", lambda status: "overloaded" in status.message)
     assert (status.level, status.message) == (WARN, "receiver overloaded, no targets")
     assert int(status.values["clippings"]) > 0
+    clipping = shared.remote.subscribe(Bool, "clipping")
+    shared.ros.wait_until(lambda: clipping and clipping[-1].data)
     shared.radar.clipping = False
+    shared.ros.wait_until(lambda: not clipping[-1].data)
     shared.ros.wait_for_status("shared: radar", lambda status: status.level == OK)
+
+
+@pytest.mark.parametrize(("model", "unknown", "is_dense"), [
+    ("iSYS-4013", {"x", "y", "z", "range"}, False), ("iSYS-6005", {"radial_velocity"}, True)])
+def test_what_a_model_does_not_measure_is_not_a_number(of_each_kind, model, unknown, is_dense):
+    here = of_each_kind(model)
+    here.radar.scene = lambda now: [Target(40.0, 1.0, 5.0, math.radians(1.0))]  # a placeholder
+    cloud = wait_for_points(here.remote, lambda cloud: cloud.width == 1)
+    (point,) = points_of(cloud)
+    assert {name for name, value in point.items() if math.isnan(value)} == unknown
+    assert (point["azimuth"], point["elevation"]) == (0.0, 0.0)
+    assert cloud.is_dense == is_dense
 
 
 def test_every_cycle_is_published_or_counted_as_lost(shared):
@@ -543,12 +557,16 @@ def test_range_and_temperature_are_published_where_asked_for(station):
     here.radar.temperature = 12.34
     ranges = here.remote.subscribe(Range, "range")
     temperatures = here.remote.subscribe(Temperature, "temperature")
-    here.remote.subscribe(PointCloud2, "points")
+    lists = here.remote.subscribe(Float32MultiArray, "range_list")
     here.ros.wait_until(lambda: ranges and ranges[-1].range == pytest.approx(7.123456)
                    and temperatures and temperatures[-1].temperature == pytest.approx(12.34))
     assert (ranges[-1].min_range, ranges[-1].max_range) == (0.0, 20.0)
     assert ranges[-1].header.frame_id == temperatures[-1].header.frame_id == "mast"
     assert abs(stamp_of(ranges[-1]) - stamp_of(temperatures[-1])) < 1.0
+    here.ros.wait_until(lambda: lists)
+    assert lists[-1].layout.dim[0].label == (
+        "range, amplitude, temperature, standard_deviation, variance, minimum, maximum")
+    assert list(lists[-1].data) == pytest.approx([7.123456, 40.0, 12.34, 0.0, 0.0, 0.0, 0.0])
 
 
 def test_a_range_without_a_target_is_infinite_and_unknown_while_clipping(station):
@@ -556,6 +574,10 @@ def test_a_range_without_a_target_is_infinite_and_unknown_while_clipping(station
     here.radar.scene = lambda now: []
     ranges = here.remote.subscribe(Range, "range")
     here.ros.wait_until(lambda: ranges and ranges[-1].range == math.inf)
+    assert here.remote.set_atomically({"no_echo_value": "max_range", "field_of_view": 0.2,
+                                       "too_close_value": "min_range"}).successful
+    here.ros.wait_until(lambda: ranges[-1].range == 20.0)
+    assert ranges[-1].field_of_view == pytest.approx(0.2)
     here.radar.clipping = True
     here.ros.wait_until(lambda: math.isnan(ranges[-1].range))
 
@@ -780,7 +802,7 @@ def test_the_life_of_a_node_that_does_not_start_by_itself(ros, lab, launch):
     process = launch({"serial_port": line.port, "serial_baud": FAST_LINE, "autostart": False})
     radar = ros.remote(NAME)
     clouds = radar.subscribe(PointCloud2, "points")
-    settings = settings_of(simulated.model).keys()
+    settings = simulated.settings.keys()
     for _ in range(2):
         assert radar.state() == "unconfigured"
         status = ros.wait_for_status("isys_radar: radar")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -70,8 +71,9 @@ def _record(names: tuple[str, ...], location: int | None) -> IsysRecord:
     """Return the record that holds exactly these settings."""
     record = ALL_SETTINGS[names[0]].record
     assert isinstance(record, IsysRecord)
-    assert names == tuple(
-        setting.name for setting in ALL_SETTINGS.values() if setting.record == record)
+    section = ALL_SETTINGS[names[0]].section
+    assert names == tuple(setting.name for setting in ALL_SETTINGS.values()
+                          if setting.record == record and setting.section == section)
     assert record.has_location == (location is not None)
     return record
 
@@ -102,9 +104,8 @@ def _request(meaning: Meaning) -> Frame:
     raise AssertionError(meaning)
 
 
-def _values(record: IsysRecord, fields: tuple[Raw, ...]) -> dict[str, Any]:
-    return {setting.name: setting.decode(fields[setting.field])
-            for setting in ALL_SETTINGS.values() if setting.record == record}
+def _values(names: Iterable[str], fields: tuple[Raw, ...]) -> dict[str, Any]:
+    return {name: ALL_SETTINGS[name].decode(fields[ALL_SETTINGS[name].field]) for name in names}
 
 
 def test_all_frames_of_the_manual_are_here() -> None:
@@ -136,7 +137,7 @@ def test_a_request_is_what_the_manual_prints(data: bytes, meaning: Meaning) -> N
 def test_a_write_request_holds_the_values(data: bytes, meaning: Write) -> None:
     record = _record(tuple(meaning.values), meaning.location)
     pdu = _parse(data, meaning).pdu
-    assert _values(record, record.unpack(pdu[len(pdu) - record.size:])) == meaning.values
+    assert _values(meaning.values, record.unpack(pdu[len(pdu) - record.size:])) == meaning.values
 
 
 @pytest.mark.parametrize(("data", "meaning"), _examples(*REPLIES))
@@ -165,7 +166,7 @@ def test_a_reply_to_a_read_gives_the_values(data: bytes, meaning: Values) -> Non
     record = _record(tuple(meaning.values), meaning.location)
     frame = _parse(data, meaning)
     fields = record.decode_reply(frame.pdu, Location(meaning.location or RAM))
-    assert _values(record, fields) == meaning.values
+    assert _values(meaning.values, fields) == meaning.values
     assert frame.function_code == record.function_code
     assert frame.pdu.endswith(record.pack(_fields(record, meaning.values)))
 
@@ -299,6 +300,7 @@ LIMITS = {
 # The words of all other settings, in the order of their codes; the directions begin at 1.
 CHOICES = {
     "measurement_mode": {"fast": 0, "multi_target": 1},
+    "range_bound": {"50_m": 0, "150_m": 1},  # N13, I34
     "target_list_interface": {"disabled": 0, "spi": 1, "ethernet": 2},
     "led": {"disabled": 0, "enabled": 1, "no_blinking": 2},
     "output1.mode": {"disabled": 0, "digital": 1, "pwm": 2},
@@ -425,13 +427,23 @@ def test_tenths_and_hundredths_are_exact() -> None:
         assert hundredths.decode(raw) == raw / 100
 
 
+@pytest.mark.parametrize("bits", [16, 32])
+def test_a_list_of_another_resolution_than_asked_for_is_refused(bits: int) -> None:
+    frame = _list_32("0E D3", "00 00 00 00", "00 2B CB 75", "00 00 03 E8")
+    if bits == 32:
+        assert len(decode_target_list(frame, bits=32).targets) == 1
+    else:
+        with pytest.raises(FrameError, match="target list of 32 bit instead of 16"):
+            decode_target_list(frame, bits=16)
+
+
 def test_a_code_without_a_name_is_shown() -> None:
     assert ALL_SETTINGS["led"].decode(7) == "code_7"
 
 
 def test_settings_that_need_the_acquisition_stopped() -> None:
     assert {name for name, setting in ALL_SETTINGS.items() if setting.needs_stop} == {
-        "frequency_channel", "measurement_mode", *ADDRESSES,
+        "frequency_channel", "measurement_mode", "range_bound", *ADDRESSES,
         "ip_destination.target_list_port", "ip_destination.record_port"}
 
 
@@ -439,7 +451,8 @@ def test_thresholds_are_saved_with_the_application_settings() -> None:  # errata
     saved_with_sensor = {name for name, setting in ALL_SETTINGS.items()
                          if not is_application_setting(setting)}
     assert saved_with_sensor == {
-        "frequency_channel", "measurement_mode", "target_list_interface", "led", *ADDRESSES,
+        "frequency_channel", "measurement_mode", "range_bound", "target_list_interface", "led",
+        *ADDRESSES,
         "ip_destination.target_list_port", "ip_destination.record_port"}
 
 
@@ -465,7 +478,7 @@ def test_thresholds_are_saved_with_the_application_settings() -> None:  # errata
 def test_both_forms_of_a_reply_are_understood(name: str, pdu: str, values: dict[str, Any]) -> None:
     record = _record(tuple(values), EEPROM)
     assert ALL_SETTINGS[name].record == record
-    assert _values(record, record.decode_reply(bytes.fromhex(pdu), Location.EEPROM)) == values
+    assert _values(values, record.decode_reply(bytes.fromhex(pdu), Location.EEPROM)) == values
 
 
 @pytest.mark.parametrize(("name", "pdu", "location", "text"), [

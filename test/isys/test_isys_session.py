@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import re
 
 import numpy as np
@@ -251,7 +252,7 @@ def test_every_setting_can_be_written_alone(connect, name):
     for name in low:  # a smallest value goes down first and its largest up first
         for values in (low, high) if "_max" in name else (high, low):
             change = {name: values[name]}
-            assert master.maintenance.write(master.radar, change) == change
+            assert master.maintenance.write(master.radar, change)[name] == values[name]
             assert simulated.value(name) == values[name]
 
 
@@ -737,6 +738,97 @@ def test_board_temperatures_are_read(connect, model):
     master.until(lambda: master.heard.temperatures
                  and master.heard.temperatures[-1]["rfe"] == pytest.approx(-3.25))
     assert master.heard.temperatures[-1] == pytest.approx({"dsp": -0.25, "rfe": -3.25})
+
+
+# --- two views of one setting (N15) ------------------------------------------------------------
+
+FINE, COARSE = "output1.range_max_extended", "output1.range_max"
+
+
+def test_both_views_of_a_limit_are_shown_and_the_last_one_set_is_wanted(connect):
+    master, _, simulated = connect("iSYS-6203", wanted={COARSE: 15.0})
+    assert master.maintenance.write(master.radar, {FINE: 12.34}) == {FINE: 12.34, COARSE: 12.3}
+    assert master.radar.values[COARSE] == 12.3
+    assert master.radar.options.wanted == {FINE: 12.34}
+    simulated.power_cycle(now=-math.inf)
+    master.measure(2)
+    assert simulated.value(FINE) == 12.34
+    assert master.maintenance.write(master.radar, {COARSE: 9.0}) == {COARSE: 9.0, FINE: 9.0}
+    assert master.radar.options.wanted == {COARSE: 9.0}
+
+
+@pytest.mark.parametrize("order", [(COARSE, FINE), (FINE, COARSE)])
+def test_of_both_views_given_together_the_finer_one_counts(connect, order):
+    wanted = {COARSE: 15.0, FINE: 12.34}
+    master, _, simulated = connect("iSYS-6003", wanted={name: wanted[name] for name in order})
+    assert simulated.value(FINE) == 12.34
+    assert master.radar.values[COARSE] == simulated.value(COARSE) == 12.3
+    master.maintenance.write(master.radar, {FINE: 11.11})  # what it is now is not written again
+    master.measure(3)
+    assert not any("configuring it again" in note for note in master.heard.notes)
+
+
+def test_thresholds_of_the_6203_are_views_of_each_other(connect):
+    name = "output1.temperature_warning_celsius"
+    master, _, _ = connect("iSYS-6203", wanted={name: 33.0})
+    other = "output1.temperature_threshold_celsius"
+    assert master.maintenance.write(master.radar, {other: 40.25}) == {other: 40.25, name: 40.25}
+    assert master.maintenance.set_default_thresholds(master.radar)[0] == 55.0
+    assert master.radar.values[name] == 55.0
+
+
+def test_settings_that_turn_out_to_be_independent_stay_wanted(connect, monkeypatch):
+    monkeypatch.setattr(simulated_radar.SimulatedRadar, "_show_in_other_view", lambda *_: None)
+    master, _, _ = connect("iSYS-6203", wanted={COARSE: 15.0})
+    assert master.maintenance.write(master.radar, {FINE: 12.34}) == {FINE: 12.34, COARSE: 15.0}
+    assert master.radar.options.wanted == {FINE: 12.34, COARSE: 15.0}
+
+
+# --- what a radar may lack ---------------------------------------------------------------------
+
+def test_a_radar_that_is_silent_on_what_is_optional_is_used(start, monkeypatch):
+    monkeypatch.setattr(connection, "KEEP_ALIVE", 0.02)
+    line, simulated = start("iSYS-5020")
+    simulated.bare = True
+    master = Master(line.port).find()
+    identity = master.radar.identity
+    assert (identity.dsp_hardware, identity.rfe_hardware, identity.bootloader) == (None,) * 3
+    requests = counted_requests(simulated)
+    master.bus.set_active(True)
+    master.until(lambda: master.radar.absent == {"dsp", "rfe"})
+    before = len(requests)
+    master.until(lambda: len(requests) >= before + 6)
+    assert master.heard.temperatures == master.heard.lost == []
+    assert master.radar.statistics.timeouts == 0
+    master.bus.close()
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_the_range_bound_is_offered_where_the_firmware_has_it(start, there):  # N13
+    line, simulated = start("iSYS-4001", range_bound=there)
+    simulated.scene = lambda now: [Target(40.0, 1.0, 30.0, 0.0), Target(40.0, 1.0, 90.0, 0.0)]
+    master = Master(line.port).find()
+    assert ("range_bound" in master.radar.settings) == there
+    assert master.heard.warnings == []
+    assert len(master.measure()[0].targets) == 2
+    if there:
+        assert master.radar.values["range_bound"] == "150_m"
+        master.maintenance.write(master.radar, {"range_bound": "50_m"})  # it is stopped for that
+        assert len(master.lists()[0].targets) == 1
+    master.bus.close()
+
+
+# --- nonsense ----------------------------------------------------------------------------------
+
+@pytest.mark.parametrize("model", ["iSYS-4001", "iSYS-6003"])
+def test_nonsense_is_dropped_and_counted(connect, model):
+    master, _, simulated = connect(model, read_range_list=True)
+    simulated.nonsense = True
+    master.bus.set_active(True)
+    master.until(lambda: master.radar.statistics.implausible_lists >= 8)
+    assert master.heard.lists == master.heard.range_lists == master.heard.lost == []
+    simulated.nonsense = False
+    master.lists(2)
 
 
 # --- lost cycles -------------------------------------------------------------------------------

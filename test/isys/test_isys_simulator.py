@@ -371,6 +371,37 @@ def test_the_filters_of_an_output(filtered, values, ranges):
     assert passed(filtered, **values) == pytest.approx(ranges)
 
 
+def test_a_fine_limit_and_the_mounting_offset_of_the_6203():
+    radar = SimulatedRadar(find_model("6203"))
+    radar.scene = lambda now: [Target(30.0, 0.0, 5.55, 0.0), Target(30.0, 0.0, 5.65, 0.0)]
+    assert passed(radar, range_max_extended=5.61) == pytest.approx([5.55])
+    radar.set_value("mounting_offset", 0.5)
+    assert passed(radar) == pytest.approx([5.05, 5.15])
+
+
+def test_rising_and_falling_delay():  # section 3.3.5.3
+    cycle_time, seen = 0.075, {2, 3, 4, 5, 8, 12}
+    radar = SimulatedRadar(find_model("4001"))
+    radar.scene = lambda now: [Target(
+        30.0, 1.0, 10.0 if round(now / cycle_time) in seen else 149.0, 0.0)]
+
+    def cycles_with_targets(**values):
+        passed(radar, range_max=20.0, **values)
+        return [cycle for cycle in range(16) if radar.targets(1, cycle * cycle_time)]
+
+    assert cycles_with_targets() == [2, 3, 4, 5, 8, 12]
+    assert cycles_with_targets(rising_delay_cycles=3) == [4, 5]
+    assert cycles_with_targets(falling_delay_cycles=3) == [4, 5, 6, 7, 8, 9, 10]
+    assert cycles_with_targets(rising_delay_cycles=0) == [*range(2, 11), 12, 13, 14]
+
+
+def test_a_pwm_output_shows_what_the_filter_looks_at(filtered):  # section 3.3.8.2
+    passed(filtered, mode="pwm", filter_signal="velocity", filter_type="min")
+    assert filtered._digital_output(1, 0.0) == -200
+    passed(filtered, filter_signal="range", filter_type="max")
+    assert filtered._digital_output(1, 0.0) == 6000
+
+
 @pytest.mark.parametrize(("values", "state"), [
     ({"mode": "digital"}, 1), ({"mode": "digital", "range_max": 5.0}, 0),
     ({"mode": "digital", "contact": "normally_closed"}, 0),

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import heapq
 import itertools
-import random
 
 from driver_common import device_bus
 from driver_common.serial_link import BITS_PER_BYTE
+from driver_common.simulator.line import Faults
 from isys_radar_driver import access, acquisition, connection, line, radar, session
 from isys_radar_driver.models import find_model
 from isys_radar_driver.simulator import radar as simulated_radar
@@ -41,42 +41,13 @@ class VirtualTime:
         self.now += max(seconds, 0.0)
 
 
-class Damage:
-    """Hurts bytes at random: drop, flip, double, delay, split, all with the same probability."""
-
-    KINDS = ("drop", "flip", "double", "delay", "split")
-
-    def __init__(self, rate, seed=1):
-        self.rate = rate
-        self._random = random.Random(seed)
-
-    def spares(self, length):
-        """Return the probability that so many bytes arrive as they are, maybe late."""
-        return (1 - 0.6 * self.rate) ** length
-
-    def apply(self, data):
-        """Return the pieces that arrive, each with the time in s by which it is later."""
-        pieces, late = [(0.0, bytearray())], 0.0
-        for byte in data:
-            arrives = bytes((byte,))
-            if self._random.random() < self.rate:
-                kind = self._random.choice(self.KINDS)
-                if kind == "flip":
-                    arrives = bytes((byte ^ 1 << self._random.randrange(8),))
-                if kind in ("delay", "split"):
-                    late += self._random.uniform(0, 0.03) if kind == "delay" else 0.0
-                    pieces.append((late, bytearray()))
-                arrives = {"drop": b"", "double": 2 * arrives}.get(kind, arrives)
-            pieces[-1][1].extend(arrives)
-        return [(late, bytes(piece)) for late, piece in pieces if piece]
-
-
 class VirtualLink:
     """A `SerialLink` to simulated radars.
 
     Attributes:
         replies: What the radars sent.
-        damage: What happens to the bytes, in both directions.
+        noise: Bytes that come again and again, at the line's full speed.
+        faults: What happens to the bytes, in both directions.
     """
 
     def __init__(self, clock, *models):
@@ -85,8 +56,9 @@ class VirtualLink:
         self.radars = [SimulatedRadar(find_model(model)) for model in models]
         self.devices = SimulatedRadars(self.radars)
         self.baud_rate = self.devices.baud_rate
-        self.damage = Damage(0.0)
+        self.faults = Faults()
         self.replies = set()
+        self.noise = b""
         self._events = []
         self._order = itertools.count()
         self._arrived = bytearray()
@@ -103,6 +75,9 @@ class VirtualLink:
 
     def read(self, timeout):
         end = self.clock.now + max(timeout, 0.0)
+        if self.noise:
+            self.clock.sleep(self.seconds(len(self.noise)))
+            return self.noise
         while True:
             while self._events and self._events[0][0] <= self.clock.now:
                 due, _, take, data = heapq.heappop(self._events)
@@ -113,7 +88,7 @@ class VirtualLink:
             self.clock.now = min(end, *(event[0] for event in self._events[:1]), end)
 
     def _transmit(self, now, data, take):
-        for late, piece in self.damage.apply(data):
+        for late, piece in self.faults.hurt(data):
             now += self.seconds(len(piece))
             heapq.heappush(self._events, (now + late, next(self._order), take, piece))
 
