@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,8 +34,7 @@ class Completeness:
         return self.came + 1 >= ENOUGH * self.due
 
 
-def count(stamps: Array, rate: float, start: float, end: float, machine: Machine,
-          programs: Iterable[str]) -> Completeness:
+def count(stamps: Array, rate: float, start: float, end: float, machine: Machine) -> Completeness:
     """Count the messages of a topic.
 
     Args:
@@ -44,11 +42,10 @@ def count(stamps: Array, rate: float, start: float, end: float, machine: Machine
         rate: How many a second are due.
         start: Time since the epoch from which they were recorded.
         end: The same until when.
-        machine: What the machine did.
-        programs: The programs through which the messages went.
+        machine: What the machine did to the programs through which the messages went.
     """
     edges: Array = start + WINDOW * np.arange(int((end - start) / WINDOW) + 1, dtype=float)
     came, _ = np.histogram(stamps, edges) if edges.size > 1 else (np.zeros(0, int), edges)
-    busy = machine.is_busy(programs, edges[:-1] + WINDOW / 2)
+    busy = machine.is_busy(edges[:-1] + WINDOW / 2)
     return Completeness(int(came[~busy].sum()), rate * WINDOW * int((~busy).sum()),
                         int(busy.sum()), busy.size)

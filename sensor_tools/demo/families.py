@@ -111,7 +111,8 @@ def compare_radar(messages: Sequence[Any], machine: Machine) -> Comparison:
         tracks=np.tile(np.arange(targets), len(times)),
         names=[f"target {track + 1}" for track in range(targets)],
         measured=np.linalg.norm(measured, axis=2).ravel(), errors=1e3 * errors.ravel(),
-        tolerances=1e3 * tolerances.ravel(), places=measured.reshape(-1, 2),
+        tolerances=1e3 * tolerances.ravel(), busy=np.repeat(machine.is_busy(times), targets),
+        places=measured.reshape(-1, 2),
         curve_seconds=curve_times - times[0], curves=np.linalg.norm(curve_places, axis=2),
         curve_places=curve_places, delay=common_delay((measured - places)[there], speeds[there]),
         delay_limit=COMMON_DELAY + float(np.median(machine.lateness(times))))
@@ -165,6 +166,7 @@ def compare_vibration(messages: Sequence[Any], machine: Machine) -> Comparison:
         "acceleration [m/s²]", "acceleration error [m/s²]", seconds=times - times[0],
         tracks=np.zeros(len(times), np.int64), names=["x"], measured=measured,
         errors=np.abs(measured - true), tolerances=2 * STH_RESOLUTION + slopes,
+        busy=machine.is_busy(times),
         curve_seconds=even, curves=vibration_in_x(even + times[0] - delay)[:, np.newaxis],
         delay=delay, delay_limit=COMMON_DELAY + float(np.median(late)))
 
@@ -198,7 +200,7 @@ def compare_fill_level(messages: Sequence[Any], machine: Machine) -> Comparison:
         "range [m]", "range error [mm]", seconds=times - times[0],
         tracks=np.zeros(len(times), np.int64), names=["fill level"],
         measured=np.where(np.isfinite(measured), measured, math.nan), errors=1e3 * errors,
-        tolerances=1e3 * tolerances, curve_seconds=even - times[0],
+        tolerances=1e3 * tolerances, busy=machine.is_busy(times), curve_seconds=even - times[0],
         curves=truth(even)[:, np.newaxis],
         remark=f"{np.count_nonzero(too_close)} in the blind zone" if too_close.any() else "")
 

@@ -47,13 +47,17 @@ class Machine:
         """
         return self._growth(1, times, NEAR)
 
-    def is_busy(self, programs: Iterable[str], times: Array) -> npt.NDArray[np.bool_]:
-        """Return whether near `times` programs did not get what they need to lose nothing."""
+    def of(self, programs: Iterable[str]) -> Machine:
+        """Return what the machine did to some programs."""
+        chosen = [name for name in programs if name in self._programs]
+        columns = [2 + self._programs.index(name) for name in chosen]
+        return Machine(chosen, self._notes[:, [0, 1, *columns]])
+
+    def is_busy(self, times: Array) -> npt.NDArray[np.bool_]:
+        """Return whether near `times` a program did not get what it needs to be in time."""
         busy = self.lateness(times) > BUSY_LATENESS
-        for name in programs:
-            if name in self._programs:
-                busy |= self._growth(2 + self._programs.index(name), times,
-                                     NEAR_LOSS) > BUSY_WAIT
+        for column in range(2, self._notes.shape[1]):
+            busy |= self._growth(column, times, NEAR_LOSS) > BUSY_WAIT
         return np.asarray(busy)
 
     def _growth(self, column: int, times: Array, near: float) -> Array:

@@ -189,6 +189,10 @@ def _driver(family: Family) -> str:
     return f"{family.name} driver"
 
 
+def _programs(family: Family) -> tuple[str, str]:
+    return _simulator(family), _driver(family)
+
+
 def _start(families: Sequence[Family], processes: Processes) -> None:
     from sensor_tools.demo.processes import Program, free_port
 
@@ -232,7 +236,7 @@ def _ended(processes: Processes) -> list[str]:
 
 def _last_lines(family: Family, processes: Processes) -> str:
     return "".join(f"\n  last lines of the {name}:\n{processes.last_lines(name)}"
-                   for name in (_simulator(family), _driver(family)))
+                   for name in _programs(family))
 
 
 def _record(duration: float, recorder: Recorder, interruption: Interruption) -> None:
@@ -272,8 +276,8 @@ def _missing(families: Sequence[Family], recorder: Recorder, processes: Processe
         owners = [family for family in families if channel.topic in family.topics] or families
         stamps = channel.stamps()
         start = recorder.began if len(stamps) == channel.count else float(stamps[0])
-        programs = [name for family in owners for name in (_simulator(family), _driver(family))]
-        result = count(stamps, channel.topic.rate, start, end, machine, [RECORDER, *programs])
+        programs = [RECORDER, *(name for family in owners for name in _programs(family))]
+        result = count(stamps, channel.topic.rate, start, end, machine.of(programs))
         excused, windows = max(excused, result.busy), result.windows
         if not channel.count or not result.suffices:
             faults.append(f"{channel.topic.name} had {result.came} messages instead of "
@@ -295,7 +299,7 @@ def _compare(families: Sequence[Family], recorder: Recorder, machine: Machine,
         messages = channels[family.topics[0]].messages()
         if len(messages) < 2:
             continue  # that is complained of elsewhere
-        comparison = family.compare(messages, machine)
+        comparison = family.compare(messages, machine.of(_programs(family)))
         compared.append((family, comparison))
         print(f"{family.name}: {comparison}")
         if not comparison.agrees:

@@ -226,7 +226,7 @@ def compare(messages, machine):
     times = numpy.arange(numbers.size, dtype=float)
     return Comparison("number [1]", "losses [1]", seconds=times, tracks=times.astype(int) * 0,
                       names=["x"], measured=numbers, errors=losses, tolerances=times * 0,
-                      curve_seconds=times, curves=numbers[:, None])
+                      busy=times < 0, curve_seconds=times, curves=numbers[:, None])
 
 def main():
     Machine.of_log = lambda path, programs: Machine()  # whatever it did: it excuses nothing

@@ -50,10 +50,14 @@ def test_good_samples_agree():
 
 @pytest.mark.parametrize("busy", [QUIET, machine(0.003, 2.0)], ids=["quiet", "busy"])
 @pytest.mark.parametrize(("wrong", "late"), [
-    ({"axis": 1}, 0.0), ({"axis": 2}, 0.0), ({"scale": 1.1}, 0.0), ({"scale": -1.0}, 0.0),
+    ({"axis": 1}, 0.0), ({"axis": 2}, 0.0), ({"scale": 1.5}, 0.0), ({"scale": -1.0}, 0.0),
     ({}, 0.0065), ({}, -0.0065), ({}, 0.5)])
 def test_wrong_samples_do_not(wrong, late, busy):
     assert not compare_vibration(imus(SAMPLES, SAMPLES + late, **wrong), busy).agrees
+
+
+def test_a_scale_that_is_10_percent_off_does_not_on_a_quiet_machine():
+    assert not compare_vibration(imus(SAMPLES, SAMPLES, scale=1.1), QUIET).agrees
 
 
 @pytest.mark.parametrize("late", [0.005, -0.005])
@@ -88,31 +92,33 @@ def test_clouds_without_points_do_not():
 
 
 def test_lost_messages_are_missed():
-    complete = count(SAMPLES, 9523.8, START, START + 4, QUIET, ["driver"])
+    complete = count(SAMPLES, 9523.8, START, START + 4, QUIET)
     assert complete.suffices
     assert (complete.came, complete.busy, complete.windows) == (len(SAMPLES), 0, 4)
     lossy = SAMPLES[np.arange(len(SAMPLES)) % 8 > 0]
-    assert not count(lossy, 9523.8, START, START + 4, QUIET, ["driver"]).suffices
+    assert not count(lossy, 9523.8, START, START + 4, QUIET).suffices
     ended = SAMPLES[SAMPLES < START + 3]
-    assert not count(ended, 9523.8, START, START + 4, QUIET, ["driver"]).suffices
+    assert not count(ended, 9523.8, START, START + 4, QUIET).suffices
 
 
 @pytest.mark.parametrize("busy", [{"lateness": 0.01}, {"wait": 0.7}])
 def test_what_is_lost_while_the_machine_is_busy_is_excused(busy):
     hole = SAMPLES[(SAMPLES < START + 2) | (SAMPLES > START + 3)]
     excused = count(hole, 9523.8, START, START + 4,
-                    machine(**busy, since=START + 2, until=START + 3), ["driver"])
+                    machine(**busy, since=START + 2, until=START + 3))
     assert excused.suffices
     assert 1 <= excused.busy <= 3
     assert excused.came == pytest.approx(9523.8 * (excused.windows - excused.busy), abs=2)
     assert not count(hole, 9523.8, START, START + 4,
-                     machine(**busy, since=START + 4, until=START + 5), ["driver"]).suffices
+                     machine(**busy, since=START + 4, until=START + 5)).suffices
 
 
 def test_that_other_programs_wait_excuses_nothing():
     times = np.array([START + 2])
-    assert machine(wait=2 * BUSY_WAIT).is_busy(["driver"], times)
-    assert not machine(wait=2 * BUSY_WAIT).is_busy(["other"], times)
+    busy = machine(wait=2 * BUSY_WAIT)
+    assert busy.is_busy(times)
+    assert busy.of(["driver", "other"]).is_busy(times)
+    assert not busy.of(["other"]).is_busy(times)
 
 
 def test_the_notes_of_the_heartbeat_are_read_but_for_a_line_that_is_not_complete(tmp_path):
@@ -120,9 +126,9 @@ def test_the_notes_of_the_heartbeat_are_read_but_for_a_line_that_is_not_complete
     log.write_text(f"{START:.3f} 0.0 1.0\n{START + 1:.3f} 0.004 1.5\n{START + 2:.3f} 0.0")
     notes = Machine.of_log(log, ["driver"])
     assert notes.lateness(np.array([START + 0.5])) == pytest.approx(0.004)
-    assert notes.is_busy(["driver"], np.array([START, START + 1])).all()
+    assert notes.is_busy(np.array([START, START + 1])).all()
     log.write_text("")
-    assert not Machine.of_log(log, ["driver"]).is_busy(["driver"], np.array([START])).any()
+    assert not Machine.of_log(log, ["driver"]).is_busy(np.array([START])).any()
 
 
 def test_the_heartbeat_notes_beats_that_are_late(monkeypatch, capsys):
