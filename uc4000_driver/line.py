@@ -39,7 +39,7 @@ T = TypeVar("T")
 LATENCY = 0.100  # s, allowance for USB adapters and the host
 QUIET = 0.200  # s of silence after which no late reply is expected any more
 SLICE = 0.1  # s after which a long wait looks whether it is to end
-PATIENCE = 0.4  # s for which others can wait as well
+PATIENCE = 0.5  # s for which others can wait as well
 
 ECHO_CHOICES = {"auto": None, "on": True, "off": False}
 TRANSMISSION_ERRORS = (ErrorCode.CHECKSUM_ERROR, ErrorCode.TELEGRAM_TIMEOUT,
@@ -224,18 +224,16 @@ class Line:
             return
         while (remaining := self._late_until - time.monotonic()) > 0:
             self.stray_bytes += len(self.read(remaining, self._late_until))
-        barrier = next((command for command in (READ_VERSION, READ_SERIAL_NUMBER)
+        barrier = next((command for command in (READ_SERIAL_NUMBER, READ_VERSION)
                         if command.reply_length not in self._late), None)
         if address == CAST or barrier is None:
             self._wait_for_silence()
         else:
             try:
                 self._converse([(address, barrier)], who, LATENCY)
-            except DamagedRequestError:
-                raise
-            except (FrameError, RefusedError) as error:  # what came may be old as well
+            except RefusedError as error:  # that, too, may be old
                 self._late.add(barrier.reply_length)
-                raise NoAnswerError(f"no answer from {who} but perhaps older ones: {error}"
+                raise NoAnswerError(f"no answer from {who} but perhaps an older one: {error}"
                                     ) from None
         self._late.clear()
 

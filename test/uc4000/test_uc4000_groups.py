@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
 import random
-import time
 
 import pytest
 from uc4000_master import Requests, counts, named, still
@@ -51,19 +51,21 @@ def test_those_of_a_group_measure_together(connect, echo):
 
 
 def test_a_group_of_seven_is_as_fair_as_it_is_fast(connect):
-    line, _ = connect(*range(1, 8))
+    line, sensors = connect(*range(1, 8))
     master = connect.master(line, *named(*range(1, 8)),
                             groups=["s1, s2, s3, s4, s5, s6, s7"]).find()
     master.measure(7)
-    before, begin = counts(master), time.monotonic()
+    before = counts(master)
+    for sensor in sensors:
+        sensor.measurements.clear()
     master.measure(21)
-    took = time.monotonic() - begin
     gained = [count - before[name] for name, count in counts(master).items()]
     assert max(gained) - min(gained) <= 2
     for name, measurement in master.heard.measurements:
         assert measurement.distance.value == still(int(name[1]) - 1)
-    if not master.bus.acquisition.groups[0].failures:
-        assert took < 21 * 0.05  # in turn it would be 0.06 s each, and more
+    times = sorted(times for sensor in sensors for times in sensor.measurements)
+    together = sum(begin < end for (_, end), (begin, _) in itertools.pairwise(times))
+    assert together >= len(times) / 2 or master.bus.acquisition.groups[0].failures
 
 
 def test_replies_anywhere_in_their_spread_do_not_meet(connect):
