@@ -482,9 +482,11 @@ def test_a_sensor_that_dawdles_is_one_sensor(connect):
 
     def dawdle(request, answer):  # one thing after the other, some of them late
         nonlocal busy_until
-        if answer:
-            busy_until = max(busy_until, answer[0]) + chance.choice((0.0, 0.0, 0.5))
-        return answer and (busy_until, answer[1])
+        if answer is None:
+            return None
+        due = max(busy_until, answer[0]) + 0.3 * (chance.random() < 0.1)
+        busy_until = due + 0.015  # more than the longest reply takes
+        return due, answer[1]
 
     Requests(simulated, dawdle)
     master = connect.master(line, Options())
