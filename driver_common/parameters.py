@@ -19,7 +19,7 @@ from driver_common.settings import Parameter, Setting, Value, suggestion
 
 _TYPES = {bool: RosParameter.Type.BOOL, int: RosParameter.Type.INTEGER,
           float: RosParameter.Type.DOUBLE, str: RosParameter.Type.STRING,
-          list: RosParameter.Type.STRING_ARRAY}
+          list: RosParameter.Type.STRING_ARRAY, tuple: RosParameter.Type.DOUBLE_ARRAY}
 
 
 def to_parameter(name: str, row: Parameter, value: Value) -> RosParameter:

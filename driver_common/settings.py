@@ -21,7 +21,7 @@ from typing import Protocol, TypeAlias
 
 from driver_common.errors import DriverError, RefusedError, SettingError
 
-Value: TypeAlias = bool | int | float | str | list[str]
+Value: TypeAlias = bool | int | float | str | list[str] | list[float]
 Raw: TypeAlias = int | float | bytes
 
 UNKNOWN = -1  # raw value that a device cannot tell; value of a code that is not in a table
@@ -34,7 +34,7 @@ class Parameter:
 
     Attributes:
         name: Parameter name, snake_case, dots between groups.
-        kind: `bool`, `int`, `float`, `str` or `list` (a list of names).
+        kind: `bool`, `int`, `float`, `str`, `list` (a list of names) or `tuple` (two numbers).
         unit: Unit of the value, "" where it has none.
         minimum: Smallest allowed value, or None.
         maximum: Largest allowed value, or None.
@@ -72,6 +72,8 @@ class Parameter:
             value = int(value)
         if self.kind is str:
             value = self._as_text(value)
+        if self.kind is tuple:
+            return self._as_pair(value)
         if self.kind is list and isinstance(value, Sequence) and not isinstance(value, str):
             if all(isinstance(item, str) for item in value):
                 return list(value)
@@ -88,6 +90,13 @@ class Parameter:
             self._check_limits(value)
         assert isinstance(value, (bool, int, float, str))
         return value
+
+    def _as_pair(self, value: object) -> list[float]:
+        pair = list(value) if isinstance(value, Sequence) else []
+        if len(pair) != 2 or not all(type(one) in (int, float) and math.isfinite(one)
+                                     for one in pair):
+            raise SettingError(f"{self.name} must be {self._kind_in_words()}, not {value!r}")
+        return [float(one) for one in pair]
 
     def _as_text(self, value: object) -> object:
         """Return the text that YAML took for another type: on, y, 16, inf, a name of digits."""
@@ -135,7 +144,7 @@ class Parameter:
         if self.choices is not None:
             return "one of " + ", ".join(self.choices)
         return {bool: "true or false", int: "a whole number", float: "a number", str: "a text",
-                list: "a list of words"}[self.kind]
+                list: "a list of words", tuple: "two numbers"}[self.kind]
 
 
 @dataclass(frozen=True)

@@ -18,10 +18,11 @@ from icotronic_driver.commands import (
 )
 from icotronic_driver.eeprom import STH_EEPROM, Field, FieldValue, Status
 from icotronic_driver.identifier import STH_1, STU_1, node_name
+from icotronic_driver.laws import Calibration
 from icotronic_driver.line import Line
 from icotronic_driver.request import Command, Request
 from icotronic_driver.sensor import Sensor, UnitIdentity
-from icotronic_driver.streaming import AXES, Calibration, supply_voltage
+from icotronic_driver.streaming import AXES, supply_voltage
 from icotronic_driver.values import decode_text
 
 T = TypeVar("T")

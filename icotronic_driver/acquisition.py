@@ -12,8 +12,9 @@ from driver_common.errors import DriverError, FrameError, NoAnswerError, Refused
 from driver_common.sample_clock import HostClock, SampleClock
 from driver_common.settings import Value
 from icotronic_driver import commands
-from icotronic_driver.access import READINGS, Access
+from icotronic_driver.access import READINGS, Access, Survey
 from icotronic_driver.identifier import STH_1
+from icotronic_driver.laws import DEVICE
 from icotronic_driver.line import Line, StreamHandler
 from icotronic_driver.sensor import Phase, Sensor
 from icotronic_driver.settings import SETTINGS, nearest_adc_configuration
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 LISTEN_TIME = 0.05  # s that jobs of others wait at most
 KEEP_ALIVE = 1.0  # s between checks of a connection without a stream
 SILENCE = 1.0  # s without a frame after which the stream is looked after
+LAW_SETTINGS = ("calibration.", "adc.reference", "used_sensor.")  # on them laws depend
 ON_THE_WAY = 0.05  # s without a frame after which none of a stopped stream will come
 
 
@@ -65,15 +67,15 @@ class Acquisition:
         """Make a connected sensor as wanted; raises DriverError."""
         self._apply_sample_rate()
         self._sensor.make_as_wanted(self.write, self._note)
-        self._choose_calibrations()
+        self._choose_laws()
 
     def write(self, changes: Mapping[str, Value]) -> dict[str, Value]:
         """Write settings, and return what the sensor reports; raises DriverError."""
         sensor = self._sensor
         with self._stopped_for(changes):
             reported = sensor.write(self._access, changes)
-            if any(name.startswith(("calibration.", "adc.reference")) for name in changes):
-                self._choose_calibrations()
+            if any(name.startswith(LAW_SETTINGS) for name in changes):
+                self._choose_laws()
         if "name" in changes and sensor.options.sensor_name:
             sensor.options.sensor_name = str(reported["name"])
         return reported
@@ -100,9 +102,18 @@ class Acquisition:
             self._note(text)
         self._told_rate = text
 
-    def _choose_calibrations(self) -> None:
-        for complaint in self._sensor.choose_calibrations():
+    def _choose_laws(self) -> None:
+        """Take the law of each channel; say which, and what is wrong."""
+        sensor = self._sensor
+        if any(one.sensor == DEVICE for one in sensor.options.laws.values()):
+            with contextlib.suppress(RefusedError):
+                sensor.eeprom_calibrations = Survey(self._line).eeprom_calibrations()
+        before = sensor.channels
+        sensor.choose_laws()
+        for complaint in sensor.law_complaints:
             self._note(complaint, warning=True)
+        if sensor.channels != before:
+            self._note(f"channels {'; '.join(map(str, sensor.channels))}")
 
     def read_again(self) -> None:
         """Read all settings, and take those that changed as wanted; raises DriverError."""
@@ -112,7 +123,7 @@ class Acquisition:
                    if value != before.get(name) and value == value}  # NaN is no change
         sensor.options.wanted |= changed
         sensor.unsaved |= changed.keys()
-        self._choose_calibrations()
+        self._choose_laws()
         if changed and sensor.decoder is not None:
             self.stop()
             self.start_or_stop()

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import time
 
 from driver_common import advice
 from driver_common.device import Note
-from driver_common.errors import DriverError, NoAnswerError, RefusedError, WrongDeviceError
+from driver_common.errors import DriverError, NoAnswerError, WrongDeviceError
 from icotronic_driver import commands
 from icotronic_driver.access import READINGS, Access, Survey
 from icotronic_driver.commands import decode_name
@@ -201,8 +200,6 @@ class Connection:
         warning = survey.eeprom_warning()
         if warning:
             self._note(warning, warning=True)
-        with contextlib.suppress(RefusedError):
-            sensor.eeprom_calibrations = survey.eeprom_calibrations()
         sensor.readings = Readings(**{reading.name: survey.take_reading(sensor, reading)
                                       for reading in READINGS})
         sensor.readable = {name for name, value in vars(sensor.readings).items()

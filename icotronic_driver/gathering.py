@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from icotronic_driver.streaming import ADC_MAX
+from icotronic_driver.laws import ADC_MAX
 
 CLOCK_WAS_SET = 500_000_000  # ns by which stamps go back only if the host's clock does
 LATE = 500_000_000  # ns after the end of a period in which its samples can still be on the way
@@ -54,17 +54,20 @@ class Conversion:
     """
 
     def __init__(self, laws: Sequence[Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float64]]],
-                 axes: Sequence[int]) -> None:
+                 axes: Sequence[int | None]) -> None:
         """Make the tables.
 
         Args:
             laws: Per channel: raw values to m/s².
-            axes: Per channel: its axis, 0 … 2 for x, y, z, 3 … 5 for −x, −y, −z.
+            axes: Per channel: its axis, 0 … 2 for x, y, z, 3 … 5 for −x, −y, −z; None where it is
+                no acceleration.
         """
         raw = np.arange(ADC_MAX + 1, dtype=np.float64)
         self.channels = len(laws)
         self.tables: dict[int, tuple[int, Table]] = {}
         for channel, (law, axis) in enumerate(zip(laws, axes, strict=True)):
+            if axis is None:
+                continue
             sign = -1.0 if axis >= 3 else 1.0
             self.tables[axis % 3] = channel, (sign * law(raw)).astype(np.float32)
 

@@ -15,16 +15,26 @@ import numpy as np
 import numpy.typing as npt
 from diagnostic_msgs.msg import DiagnosticStatus
 from sensor_msgs.msg import BatteryState, Imu, PointCloud2, Temperature
-from std_msgs.msg import Float64MultiArray
+from std_msgs.msg import Float64, Float64MultiArray
 
 from driver_common import diagnostics
 from driver_common.device_node import FRAME_ID, TIME_OFFSET, DeviceNode, Topic, run
 from driver_common.recording import CAN
-from driver_common.settings import Option
+from driver_common.settings import Option, Value
 from icotronic_driver.commands import parse_request
 from icotronic_driver.eeprom import PAGE_NAMES, Field, FieldValue
 from icotronic_driver.gathering import Consumer, Conversion, Gatherer, Samples, Stream
 from icotronic_driver.identifier import STH_1, STU_1
+from icotronic_driver.laws import (
+    AUTO,
+    CELSIUS,
+    DEVICE,
+    LINEAR,
+    PARTS_BY_NAME,
+    VOLTAGE,
+    ChannelOptions,
+    Law,
+)
 from icotronic_driver.line import Line
 from icotronic_driver.maintenance import STORED
 from icotronic_driver.sensor import Channel, Options, Phase, Sensor, UnitIdentity
@@ -34,10 +44,11 @@ from icotronic_driver.streaming import AXES
 from icotronic_driver.values import CLOCK, decode_mac, encode_mac
 from icotronic_driver.vibration import COLUMNS, Vibration
 from msg_conversions.battery import to_battery_state
+from msg_conversions.float64 import serialised_float64
 from msg_conversions.imu import ImuTemplate, variances_of
 from msg_conversions.imu_batch import ImuBatchTemplate
 from msg_conversions.multi_array import to_float64_multi_array
-from msg_conversions.temperature import to_temperature
+from msg_conversions.temperature import TemperatureTemplate, to_temperature
 
 SIMULATED = "sim"
 CHANNELS = {channels: code for code, channels in enumerate(
@@ -46,8 +57,10 @@ SIGNED_AXES = {sign + axis: code for code, (sign, axis) in enumerate(
     (sign, axis) for sign in ("", "-") for axis in AXES)}
 STREAM_OPTIONS = ("channels", *(f"axis.{axis}" for axis in AXES), "sample_rate", "batch_period",
                   "vibration_period",
-                  "calibration_source", "acceleration_range_g", "linear_acceleration_stddev",
-                  "time_offset")
+                  *(f"channel.{axis}.{part}" for axis in AXES
+                    for part in ("sensor", "volts", "values", "unit")),
+                  "linear_acceleration_stddev", "time_offset")
+LAWS = {word: code for code, word in enumerate((AUTO, DEVICE, LINEAR, *PARTS_BY_NAME))}
 READING_UNITS = {"rssi": " [dBm]", "battery_voltage": " [V]", "temperature": " [°C]"}
 COLLISION = "two channels are mapped to the same axis; correct axis.x, axis.y and axis.z"
 RECEIVERS = {"sth": STH_1, "stu": STU_1}
@@ -90,13 +103,18 @@ class IcotronicNode(DeviceNode, Listener):
         Option("sample_rate", kind=float, default=0.0, minimum=0.0, maximum=CLOCK / 28, unit="Hz",
                live=True, description="Samples per second of each channel; the nearest ADC "
                                       "configuration is taken; 0 = as the adc parameters say"),
-        Option("calibration_source", kind=str, live=True, default="auto",
-               choices={"auto": 0, "device": 1, "range": 2},
-               description="Calibration from the device, or from acceleration_range_g; auto = the "
-                           "device's where it is plausible"),
-        Option("acceleration_range_g", kind=float, default=100.0, minimum=0.1, maximum=10000.0,
-               unit="g", live=True, description="The sensor measures ± this, for the calibration "
-                                                "by range"),
+        *(option for axis in AXES for option in (
+            Option(f"channel.{axis}.sensor", kind=str, choices=LAWS, default=AUTO, live=True,
+                   description=f"What channel {axis} measures, which says what its voltage means: "
+                               "auto = by used_sensor, device = by the device's calibration "
+                               "factors, linear = by volts and values, or a sensor"),
+            Option(f"channel.{axis}.volts", kind=tuple, default=list(VOLTAGE.volts), unit="V",
+                   live=True, description=f"Two voltages of the linear law of channel {axis}"),
+            Option(f"channel.{axis}.values", kind=tuple, default=list(VOLTAGE.values), live=True,
+                   description="What is measured at these voltages"),
+            Option(f"channel.{axis}.unit", kind=str, default=VOLTAGE.unit, live=True,
+                   description="Unit of these values; g and m/s² are accelerations, °C is a "
+                               "temperature"))),
         Option("linear_acceleration_stddev", kind=float, default=0.0, minimum=0.0, maximum=1e6,
                unit="m/s²", live=True,
                description="Standard deviation of the acceleration, for the covariance; 0 = "
@@ -121,7 +139,9 @@ class IcotronicNode(DeviceNode, Listener):
     TOPICS: Mapping[str, Topic] = {
         "imu/batch": Topic(PointCloud2, BATCH_DEPTH), "imu/data_raw": Topic(Imu, QUEUE_DEPTH),
         "vibration": Topic(Float64MultiArray), "battery": Topic(BatteryState),
-        "temperature": Topic(Temperature)}
+        "temperature": Topic(Temperature),
+        **{f"channel_{axis}/temperature": Topic(Temperature, QUEUE_DEPTH) for axis in AXES},
+        **{f"channel_{axis}/value": Topic(Float64, QUEUE_DEPTH) for axis in AXES}}
 
     def __init__(self) -> None:
         """Declare the parameters; raises SettingError."""
@@ -160,9 +180,26 @@ class IcotronicNode(DeviceNode, Listener):
         """Hand over the options that may change at run time."""
         options.channels = self.option("channels")
         options.sample_rate = self.option("sample_rate")
-        options.calibration_source = self.option("calibration_source")
-        options.acceleration_range = self.option("acceleration_range_g")
+        options.laws = {axis: self._channel_options(axis) for axis in AXES}
         options.status_period = self.option("status_period")
+
+    def _channel_options(self, axis: str, **changes: Any) -> ChannelOptions:
+        """Return how a channel gets its law, with some of its options changed.
+
+        Raises:
+            SettingError: Volts and values are no law.
+        """
+        given = {part: changes.get(part, self.option(f"channel.{axis}.{part}"))
+                 for part in ("sensor", "volts", "values", "unit")}
+        return ChannelOptions(given["sensor"], Law(tuple(given["volts"]), tuple(given["values"]),
+                                                   given["unit"]))
+
+    def check_option(self, name: str, value: Value) -> None:
+        """Refuse volts and values that are no law; raises SettingError."""
+        group, _, rest = name.partition(".")
+        axis, _, part = rest.partition(".")
+        if group == "channel":
+            self._channel_options(axis, **{part: value})
 
     def apply_options(self) -> None:
         """Hand live options to the bus; the stream begins anew with those that it depends on."""
@@ -184,7 +221,9 @@ class IcotronicNode(DeviceNode, Listener):
             "batch": self.add_publisher(sensor, "imu/batch"),
             "vibration": self.add_publisher(sensor, "vibration"),
             "battery_voltage": self.add_publisher(sensor, "battery"),
-            "temperature": self.add_publisher(sensor, "temperature")}
+            "temperature": self.add_publisher(sensor, "temperature"),
+            **{name: self.add_publisher(sensor, name)
+               for name in self.TOPICS if name.startswith("channel_")}}
         if self.option("publish_samples"):
             self._topics["imu"] = self.add_publisher(sensor, "imu/data_raw")
         super().make_interfaces(sensor)
@@ -212,8 +251,8 @@ class IcotronicNode(DeviceNode, Listener):
         assert sensor.identity is not None
         return (
             f'"{sensor.identity.name}" ({sensor.identity.mac}), firmware '
-            f"{sensor.identity.firmware}; channel{'s' * (len(sensor.channels) > 1)} "
-            f"{', '.join(f'{one.name} calibrated by {one.source}' for one in sensor.channels)}; "
+            f"{sensor.identity.firmware or 'not told'}; channel{'s' * (len(sensor.channels) > 1)} "
+            f"{'; '.join(map(str, sensor.channels))}; "
             f"{sensor.sample_rate:.6g} samples per second")
 
     def on_found(self, sensor: Sensor) -> None:
@@ -231,17 +270,30 @@ class IcotronicNode(DeviceNode, Listener):
             self.on_note(sensor, COLLISION, warning=True)
         conversion = Conversion([partial(_linear, channel) for channel in sensor.channels], axes)
         self._stream.finish()
-        self._stream = Stream(self._consumers(sensor, axes, conversion), len(axes),
-                              round(self.option("time_offset") * 1e9))
+        self._stream = Stream((*self._consumers(sensor, conversion), *self._others(sensor)),
+                              len(axes), round(self.option("time_offset") * 1e9))
         return self.while_running(self._stream.take)
 
-    def _consumers(self, sensor: Sensor, axes: Sequence[int],
-                   conversion: Conversion) -> Iterator[Consumer]:
-        """Yield those who take the samples of a stream."""
+    def _others(self, sensor: Sensor) -> Iterator[Consumer]:
+        """Yield those who take what is no acceleration."""
+        temperature = TemperatureTemplate(self.option("frame_id"))
+        for number, channel in enumerate(sensor.channels):
+            topic = self._topics.get(_topic_of(channel))
+            if topic is not None:
+                serialise = (temperature.serialised if channel.law.unit == CELSIUS else
+                             lambda stamp, value: serialised_float64(value))
+                yield Consumer(topic.get_subscription_count, partial(
+                    _publish_channel, topic.handle.publish_raw, serialise, channel,
+                    slice(number, None, len(sensor.channels))))
+
+    def _consumers(self, sensor: Sensor, conversion: Conversion) -> Iterator[Consumer]:
+        """Yield those who take the accelerations of a stream."""
+        if not conversion.tables:
+            return
         frame_id = self.option("frame_id")
         if "imu" in self._topics:
             template = ImuTemplate(variances_of(
-                [axis % 3 for axis in axes], self.option("linear_acceleration_stddev")), frame_id)
+                conversion.tables, self.option("linear_acceleration_stddev")), frame_id)
             topic = self._topics["imu"]
             # publish() itself costs twice as much, because it looks at what it was given.
             yield Consumer(topic.get_subscription_count, _publisher(
@@ -294,9 +346,10 @@ class IcotronicNode(DeviceNode, Listener):
                     f"{name} subscribes to {topic.topic_name} {complaint}; use imu/batch, or see "
                     "config/record_qos.yaml")
 
-    def _axes(self, sensor: Sensor) -> list[int]:
-        """Return the signed axis of each channel."""
-        return [SIGNED_AXES[self.option(f"axis.{channel.name}")] for channel in sensor.channels]
+    def _axes(self, sensor: Sensor) -> list[int | None]:
+        """Return the signed axis of each channel, None where it measures no acceleration."""
+        return [SIGNED_AXES[self.option(f"axis.{channel.name}")]
+                if channel.law.is_acceleration else None for channel in sensor.channels]
 
     def on_readings(self, sensor: Sensor, name: str) -> None:
         """Publish a reading that has a topic."""
@@ -366,9 +419,10 @@ class IcotronicNode(DeviceNode, Listener):
                        "bus load [%]": 100 * sensor.bus_load(bitrate),
                        "bus load without stuff bits [%]":
                        100 * sensor.bus_load(bitrate, stuffing=False)}
-            values |= {f"calibration of channel {channel.name}":
-                       f"{channel.slope:.6g} m/s² per step, offset {channel.offset:.6g} m/s², by "
-                       f"{channel.source}" for channel in sensor.channels}
+            values |= {f"law of channel {channel.name}":
+                       f"{channel.law}, by {channel.source}; "
+                       f"{channel.slope:.6g} · raw {channel.offset:+.6g} {channel.unit}"
+                       for channel in sensor.channels}
         values |= {f"{name.replace('_', ' ')}{READING_UNITS.get(name, '')}": _in_words(value)
                    for name, value in vars(sensor.readings).items() if value is not None}
         values |= {
@@ -403,9 +457,7 @@ class IcotronicNode(DeviceNode, Listener):
 
     def _complaints(self, sensor: Sensor) -> list[str]:
         """Return what is wrong with a connected sensor."""
-        recent, by_range = self._recent_counts(sensor), self.option("calibration_source") == "range"
-        guessed = [channel.name for channel in sensor.channels
-                   if channel.by_range and not by_range]
+        recent = self._recent_counts(sensor)
         found = {
             "another host on the bus uses our node number (SPU 1); end one of the two":
                 recent.other_host,
@@ -417,8 +469,7 @@ class IcotronicNode(DeviceNode, Listener):
             "termination and bit rate": recent.errors,
             f"{len(sensor.differing)} settings are not as wanted": sensor.differing,
             COLLISION: _collide(self._axes(sensor)),
-            f"no plausible calibration of channel {', '.join(guessed)}; it is a guess by "
-            "acceleration_range_g": guessed,
+            **dict.fromkeys(sensor.law_complaints, True),
             **dict.fromkeys(sensor.readings.faults, True),
             sensor.load_warning(self.option("can_bitrate")):
                 recent.foreign or sensor.overloads(self.option("can_bitrate"))}
@@ -484,8 +535,25 @@ def queue_complaint(subscriber: str, depth: int) -> str:
     return ""
 
 
-def _collide(axes: Sequence[int]) -> bool:
-    return len({axis % 3 for axis in axes}) < len(axes)
+def _topic_of(channel: Channel) -> str:
+    """Return the topic of a channel that measures no acceleration, "" of another."""
+    if channel.law.is_acceleration:
+        return ""
+    return f"channel_{channel.name}/{'temperature' if channel.law.unit == CELSIUS else 'value'}"
+
+
+def _publish_channel(publish: Callable[[bytes], None], serialise: Callable[[int, float], bytes],
+                     channel: Channel, places: slice, stamp: int, step: int,
+                     values: tuple[int, ...]) -> None:
+    """Publish the samples of one channel in a frame."""
+    for raw in values[places]:
+        publish(serialise(stamp, channel.slope * raw + channel.offset))
+        stamp += step
+
+
+def _collide(axes: Sequence[int | None]) -> bool:
+    used = [axis % 3 for axis in axes if axis is not None]
+    return len(set(used)) < len(used)
 
 
 def _identity(title: str, identity: UnitIdentity) -> dict[str, object]:

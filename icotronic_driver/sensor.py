@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
 
 from driver_common.device import Device, DeviceOptions
 from driver_common.host_pauses import HostPauses
 from driver_common.sample_clock import SampleClock
+from icotronic_driver.laws import (
+    DEVICE,
+    LINEAR,
+    PARTS_BY_NAME,
+    PARTS_BY_NUMBER,
+    VOLTAGE,
+    Calibration,
+    ChannelOptions,
+    Law,
+)
 from icotronic_driver.settings import SETTINGS
 from icotronic_driver.streaming import (
     AXES,
     LOAD_LIMIT,
     LOAD_MAXIMUM,
-    STANDARD_GRAVITY,
-    USUAL_REFERENCE,
-    Calibration,
     StreamDecoder,
     StreamFormat,
     StreamStatistics,
@@ -71,8 +78,7 @@ class Options(DeviceOptions):
         sensor_number: The sensor with this number, -1 = any.
         channels: Which channels are streamed.
         sample_rate: Wanted values/s of each channel; 0 = as the ADC settings say.
-        calibration_source: "device", "range", or "auto" = device where that is plausible.
-        acceleration_range: The sensor measures ± this many g, for the calibration by range.
+        laws: How each channel gets its law.
         status_period: Time in s in which battery, temperature, RSSI and counters are read once.
         may_wait: Time in s for which frames may wait for each other; nobody wants each at once.
     """
@@ -82,8 +88,8 @@ class Options(DeviceOptions):
     sensor_number: int = -1
     channels: str = "x"
     sample_rate: float = 0.0
-    calibration_source: str = "auto"
-    acceleration_range: float = 100.0
+    laws: dict[str, ChannelOptions] = field(
+        default_factory=lambda: dict.fromkeys(AXES, ChannelOptions()))
     status_period: float = 8.0
     may_wait: float = 0.0
 
@@ -132,13 +138,30 @@ class Readings:
 
 
 class Channel(NamedTuple):
-    """A streamed channel: acceleration in m/s² = slope · raw + offset."""
+    """A streamed channel: value = slope · raw + offset, an acceleration in m/s².
+
+    Attributes:
+        name: Its name: x, y or z.
+        law: What the voltage at its sensor means.
+        source: Where the law comes from, for people.
+        slope: Size of one step of the ADC.
+        offset: Value at raw zero.
+    """
 
     name: str
+    law: Law
+    source: str
     slope: float
     offset: float
-    source: str  # of the calibration
-    by_range: bool = False  # whether that is a guess by the range of the sensor
+
+    @property
+    def unit(self) -> str:
+        """Unit in which it is published."""
+        return "m/s²" if self.law.is_acceleration else self.law.unit
+
+    def __str__(self) -> str:
+        """Return name, law and source for people."""
+        return f"{self.name}: {self.law}, by {self.source}"
 
 
 class Sensor(Device):
@@ -154,6 +177,7 @@ class Sensor(Device):
         readings: What is read now and then.
         readable: Names of those that it, or the stationary unit, tells.
         channels: The streamed channels.
+        law_complaints: What is wrong with their laws.
         decoder: Decodes the stream; None while there is none.
         clock: Gives the samples of the stream their times.
         totals: Statistics of the streams before the present one.
@@ -174,6 +198,7 @@ class Sensor(Device):
         self.readings = Readings()
         self.readable: set[str] = set()
         self.channels: list[Channel] = []
+        self.law_complaints: list[str] = []
         self.eeprom_calibrations: dict[str, Calibration] = {}
         self.decoder: StreamDecoder | None = None
         self.clock = SampleClock(1.0)
@@ -280,41 +305,49 @@ class Sensor(Device):
         self.totals = self.statistics
         self.decoder = None
 
-    def choose_calibrations(self) -> list[str]:
-        """Take the calibration of each streamed channel; return what is wrong (errata C9)."""
-        complaints = []
+    def choose_laws(self) -> None:
+        """Take the law of each streamed channel, and note what is wrong with it."""
+        self.law_complaints = []
         self.channels = []
         for axis in self.options.channels:
-            calibration, source, complaint = self._calibration(axis)
-            self.channels.append(Channel(axis, calibration.slope * STANDARD_GRAVITY,
-                                         calibration.offset * STANDARD_GRAVITY, source,
-                                         by_range=source == self._range_text))
+            law, source, complaint = self._law(axis)
+            self.channels.append(Channel(axis, law, source,
+                                         *law.factors(self.adc.reference_voltage)))
             if complaint:
-                complaints.append(f"channel {axis}: {complaint}; using {source}")
-        return complaints
+                self.law_complaints.append(f"channel {axis}: {complaint}; using {source}")
 
-    def _calibration(self, axis: str) -> tuple[Calibration, str, str]:
-        """Return calibration, its source and what is wrong with it or the device's own."""
-        reference = self.adc.reference_voltage
-        by_range = Calibration.of_range(self.options.acceleration_range, reference)
-        if self.options.calibration_source == "range":
-            return by_range, self._range_text, ""
+    def _law(self, axis: str) -> tuple[Law, str, str]:
+        """Return the law of a channel, its source, and what is wrong."""
+        options = self.options.laws[axis]
+        if options.sensor == LINEAR:
+            return options.law, "its volts and values", ""
+        if options.sensor == DEVICE:
+            return self._device_law(axis)
+        if options.sensor in PARTS_BY_NAME:
+            return PARTS_BY_NAME[options.sensor].law, f"its sensor {options.sensor}", ""
+        return self._law_by_number(axis)
+
+    def _law_by_number(self, axis: str) -> tuple[Law, str, str]:
+        number = self.values.get(f"used_sensor.{axis}")
+        assumed = ", which is assumed" if number is None else ""
+        if number is None:
+            number = AXES.index(axis) + 1
+        assert isinstance(number, int)
+        part = PARTS_BY_NUMBER.get(number)
+        if part is None:
+            return VOLTAGE, "its voltage alone", (
+                f"what sensor number {number} measures is not known; set channel.{axis}.sensor")
+        return part.law, f"sensor number {number} ({part.text}){assumed}", ""
+
+    def _device_law(self, axis: str) -> tuple[Law, str, str]:
+        """Return the law of the device's calibration factors, where they are plausible."""
         own = self._device_calibrations(axis)
         for source, calibration in own:
             if not calibration.fault:
-                return calibration, source, "" if reference == USUAL_REFERENCE else (
-                    f"{source} are made for a reference voltage of {USUAL_REFERENCE:g} V, not for "
-                    f"{reference:g} V; correct them or set calibration_source to range")
+                return calibration.law, source, ""
         faults = "; ".join(f"{source}: {calibration.fault}" for source, calibration in own)
-        complaint = f"no plausible calibration ({faults or 'none stored'})"
-        if self.options.calibration_source == "device" and own:
-            source, calibration = own[0]
-            return calibration, source, complaint
-        return by_range, self._range_text, complaint
-
-    @property
-    def _range_text(self) -> str:
-        return f"the range of ±{self.options.acceleration_range:g} g"
+        law, source, _ = self._law_by_number(axis)
+        return law, source, f"no plausible calibration ({faults or 'none stored'})"
 
     def _device_calibrations(self, axis: str) -> list[tuple[str, Calibration]]:
         found = []

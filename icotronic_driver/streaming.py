@@ -17,13 +17,11 @@ import numpy.typing as npt
 
 from driver_common.errors import FrameError
 from icotronic_driver.identifier import MAX_PAYLOAD, MAX_PAYLOAD_FD, padded_length
+from icotronic_driver.laws import ADC_MAX
 
 DATA_SETS = (0, 1, 3, 6, 10, 15, 20, 30)  # by code; 0 stops the stream
 AXES = "xyz"
-ADC_MAX = 0xFFFF
-USUAL_REFERENCE = 3.3  # V, the sensor's supply; calibration factors are made with it
 SUPPLY_DIVIDER = 5.7  # 470 kΩ and 100 kΩ, section 10.3.3.1
-STANDARD_GRAVITY = 9.80665  # m/s²
 COUNTER_TURN = 256
 HALF_TURN = COUNTER_TURN // 2
 
@@ -150,38 +148,6 @@ def bus_load(messages: Iterable[tuple[float, int]], bit_rate: float = 1e6,
 def supply_voltage(raw: int, reference_voltage: float) -> float:
     """Return the battery's voltage in V from the raw value of voltage 1 (errata C8)."""
     return raw * SUPPLY_DIVIDER * reference_voltage / ADC_MAX
-
-
-@dataclass(frozen=True)
-class Calibration:
-    """Raw 16-bit values to acceleration in g: slope · raw + offset (section 8.2.1.4.1)."""
-
-    slope: float
-    offset: float
-
-    @classmethod
-    def of_range(cls, limit: float, reference: float = USUAL_REFERENCE) -> Calibration:
-        """Return the calibration of a sensor for ±`limit` g (errata C9).
-
-        Args:
-            limit: In g, where the sensor gives 0 V or its supply of 3.3 V.
-            reference: Reference voltage of the ADC in V, which is full scale.
-        """
-        return cls(2 * limit / ADC_MAX * reference / USUAL_REFERENCE, -limit)
-
-    @property
-    def fault(self) -> str:
-        """What makes it unusable, "" where it is plausible (errata C9)."""
-        if not (math.isfinite(self.slope) and math.isfinite(self.offset)):
-            return f"slope {self.slope:g} and offset {self.offset:g} are not numbers"
-        if self.slope == 0:
-            return "the slope is zero"
-        span = abs(self.slope) * ADC_MAX
-        if not 0.5 <= span <= 20000:
-            return f"a span of {span:.3g} g is absurd"
-        if not 0 <= -self.offset / self.slope <= ADC_MAX:
-            return f"zero g is not within the span (offset {self.offset:g} g, span {span:.3g} g)"
-        return ""
 
 
 @dataclass

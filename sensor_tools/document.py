@@ -31,7 +31,8 @@ ROOT = Path(__file__).resolve().parent.parent
 SEVERAL = (" With `sensors: [front, rear]` those of the driver that belong to a sensor, and all of "
            "the device, come once per sensor, as in `front.address`.")
 WIDTH = 98  # of comments in a parameter file
-TYPES = {bool: "true or false", int: "integer", float: "float", str: "text", list: "list of words"}
+TYPES = {bool: "true or false", int: "integer", float: "float", str: "text", list: "list of words",
+         tuple: "two floats"}
 
 
 @dataclass(frozen=True)

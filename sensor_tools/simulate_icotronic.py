@@ -4,9 +4,19 @@ from __future__ import annotations
 
 import argparse
 
+from driver_common.errors import SettingError
+from icotronic_driver.laws import PARTS_BY_NUMBER
 from icotronic_driver.simulator.line import simulated_network
+from icotronic_driver.simulator.scene import rest, vibration
 from icotronic_driver.simulator.unit import SILENT_ON
-from sensor_tools.simulation import Simulation, add_faults, fault_commands, set_faults, switch
+from sensor_tools.simulation import (
+    Simulation,
+    add_faults,
+    fault_commands,
+    numbers,
+    set_faults,
+    switch,
+)
 
 DESCRIPTION = "ICOtronic accelerometers on a CAN bus, served by socketcand"
 FAULTS = {
@@ -35,6 +45,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--silent-on", choices=SILENT_ON, default="nothing",
                         help="commands to which all units stay silent: those that the vendor's "
                              "client leaves unused, or all that are optional for a stream")
+    parser.add_argument("--used-sensors", default="1,2,3", metavar="X,Y,Z",
+                        help="numbers of the sensors on the channels after a reset, 1 ... 10")
+    parser.add_argument("--at-rest", action="store_true", help="the sensors lie still")
+    parser.add_argument("--noise", type=float, default=0.0,
+                        help="standard deviation in g of what they measure")
     add_faults(parser, FAULTS)
 
 
@@ -46,6 +61,13 @@ def open_simulation(options: argparse.Namespace) -> Simulation:
     network = server.network
     set_faults(network.faults, FAULTS, options)
     network.stay_silent(options.silent_on)
+    used = tuple(numbers(options.used_sensors, "--used-sensors"))
+    if len(used) != 3 or not set(used) <= PARTS_BY_NUMBER.keys():
+        raise SettingError(f"--used-sensors takes three numbers 1 ... 10, not {used}")
+    for sensor in network.sensors:
+        sensor.first_sensors = sensor.used_sensors = used
+        sensor.noise = options.noise
+        sensor.vibration = rest if options.at_rest else vibration
     server.start()
 
     def away(name: str) -> None:

@@ -37,4 +37,9 @@ def vibration(times: Times) -> npt.NDArray[np.float64]:
                             1.0 + 10.0 * impact))
 
 
+def rest(times: Times) -> npt.NDArray[np.float64]:
+    """Return the truth of a sensor that lies still: gravity in z; see `vibration`."""
+    return np.tile([0.0, 0.0, 1.0], (len(times), 1))
+
+
 Vibration = Callable[[Times], npt.NDArray[np.float64]]

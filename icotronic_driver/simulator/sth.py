@@ -13,6 +13,7 @@ import numpy.typing as npt
 from icotronic_driver.commands import CONFIGURATION, LED_NUMBER, STREAMING, TEMPERATURE_REFERENCE
 from icotronic_driver.eeprom import CALIBRATION, STH_EEPROM
 from icotronic_driver.identifier import MAX_PAYLOAD, MAX_PAYLOAD_FD, STH_1, Identifier
+from icotronic_driver.laws import PARTS_BY_NUMBER, STANDARD_GRAVITY, Law
 from icotronic_driver.simulator.scene import Times, Vibration, vibration
 from icotronic_driver.simulator.unit import (
     BOOT_TIME,
@@ -21,7 +22,7 @@ from icotronic_driver.simulator.unit import (
     Refusal,
     SimulatedNode,
 )
-from icotronic_driver.streaming import SUPPLY_DIVIDER, Calibration, StreamFormat
+from icotronic_driver.streaming import SUPPLY_DIVIDER, StreamFormat
 from icotronic_driver.values import (
     ACQUISITION_TIMES,
     OVERSAMPLING_RATES,
@@ -34,8 +35,9 @@ from icotronic_driver.values import (
 )
 
 ADVERTISEMENT = 0.02  # s between two advertisements before any energy mode begins
-SENSOR_RANGE = 100.0  # g; the sensor's ± limit
-SENSOR_SUPPLY = 3.3  # V; an acceleration sensor gives half of it at zero
+SENSOR_SUPPLY = 3.3  # V
+ACCELERATION_AXES = {1: 0, 2: 1, 3: 2, 4: 0}  # by the number of the sensor (field note N7)
+USED_SENSORS = (1, 2, 3)  # after a reset
 SELF_TEST = 0.1  # V by which the self test deflects it
 FIRST_MAC = "08:6B:D7:01:DE:81"
 
@@ -76,6 +78,10 @@ class _Stream:
         return max(0, done - self.sent)
 
 
+def _volts_per_unit(law: Law) -> float:
+    return (law.volts[1] - law.volts[0]) / (law.values[1] - law.values[0])
+
+
 class SimulatedSth(SimulatedNode):
     """A sensor, without I/O.
 
@@ -83,18 +89,20 @@ class SimulatedSth(SimulatedNode):
         vibration: Truth of what it measures; can be replaced.
         noise: Standard deviation of its noise in g.
         battery: Voltage of its battery in V.
+        light: What its photodiode sees, 0 … 1.
+        backpacks: What its three backpacks measure, 0 … 1 each.
         temperature: Its temperature in °C.
         rssi: How strong its radio signal is, in dBm.
         in_range: Whether radio frames get through.
         adc: Its ADC configuration.
-        used_sensors: Numbers of the sensors on its three channels.
+        first_sensors: Numbers of the sensors on its three channels after a reset.
+        used_sensors: Those at present.
         led: Whether its LED is on.
         clock_error: By which fraction its clock runs fast.
         can_fd: Whether it sends frames of up to 64 bytes.
         connected: Whether it has a connection to the stationary unit.
     """
 
-    SENSOR_COUNT = 5  # x, y, z, temperature, piezo
 
     def __init__(self, name: str, mac: str = FIRST_MAC, *, calibrated: bool = True,
                  can_fd: bool = False) -> None:
@@ -103,6 +111,9 @@ class SimulatedSth(SimulatedNode):
         self.vibration: Vibration = vibration
         self.noise = 0.0
         self.battery = 3.71
+        self.light = 0.3
+        self.backpacks = (0.25, 0.5, 0.75)
+        self.first_sensors = USED_SENSORS
         self.temperature = 24.5
         self.rssi = -52
         self.in_range = True
@@ -115,10 +126,10 @@ class SimulatedSth(SimulatedNode):
         self._random = np.random.default_rng(1)
         self._wall_offset = time.time() - time.monotonic()
         if calibrated:
-            calibration = Calibration.of_range(SENSOR_RANGE)
-            for axis in "XYZ":
-                self.eeprom[f"Acceleration {axis}: Slope"] = calibration.slope
-                self.eeprom[f"Acceleration {axis}: Offset"] = calibration.offset
+            for axis, number in zip("XYZ", USED_SENSORS, strict=True):
+                slope, offset = PARTS_BY_NUMBER[number].law.factors(SENSOR_SUPPLY)
+                self.eeprom[f"Acceleration {axis}: Slope"] = slope / STANDARD_GRAVITY
+                self.eeprom[f"Acceleration {axis}: Offset"] = offset / STANDARD_GRAVITY
         self._handlers.update({
             (STREAMING, 0x00): lambda payload, now: self._stream(0x00, payload[0], now),
             (STREAMING, 0x20): lambda payload, now: self._stream(0x20, payload[0], now),
@@ -135,7 +146,7 @@ class SimulatedSth(SimulatedNode):
         """Lose the RAM, the connection and the streams."""
         super().boot(now)
         self.adc = AdcConfiguration()  # section 10.5.1.1.6
-        self.used_sensors = (1, 2, 3)
+        self.used_sensors = self.first_sensors
         self.led = True
         self.connected = False
         self.self_test: set[int] = set()
@@ -149,14 +160,16 @@ class SimulatedSth(SimulatedNode):
 
     def voltages(self, times: Times) -> npt.NDArray[np.float64]:
         """Return the voltages of the sensors on the three channels."""
-        zero = SENSOR_SUPPLY / 2
-        measured = zero + self.vibration(times) * (zero / SENSOR_RANGE)
+        accelerations = self.vibration(times)
+        others = {5: self.temperature, 6: self.light, 10: self.battery,
+                  **dict(zip((7, 8, 9), self.backpacks, strict=True))}
         columns = []
-        for channel, sensor in enumerate(self.used_sensors, 1):
-            if sensor <= 3:
-                columns.append(measured[:, sensor - 1] + SELF_TEST * (channel in self.self_test))
-            else:  # a temperature sensor and a piezo element at rest
-                columns.append(np.full(len(times), SENSOR_SUPPLY * {4: 0.16, 5: 0.58}[sensor]))
+        for channel, number in enumerate(self.used_sensors, 1):
+            values = (accelerations[:, ACCELERATION_AXES[number]] if number in ACCELERATION_AXES
+                      else np.full(len(times), others[number]))
+            law = PARTS_BY_NUMBER[number].law
+            columns.append(law.volts[0] + (values - law.values[0]) * _volts_per_unit(law)
+                           + SELF_TEST * (channel in self.self_test))
         return np.column_stack(columns)
 
     def sample_times(self, first: int, count: int, block_command: int = 0x00) -> Times:
@@ -211,7 +224,7 @@ class SimulatedSth(SimulatedNode):
 
     def _used_sensors_command(self, payload: bytes, now: float) -> bytes:
         if payload[0] & 0x80:
-            if max(payload[1:4]) > self.SENSOR_COUNT:
+            if not set(payload[1:4]) <= {0, *PARTS_BY_NUMBER}:
                 raise Refusal(NOT_AVAILABLE)
             x, y, z = (new or old for new, old in zip(payload[1:4], self.used_sensors,
                                                       strict=True))  # section 10.5.2.1
@@ -325,8 +338,9 @@ class SimulatedSth(SimulatedNode):
         if block_command == 0x00:
             voltages = self.voltages(times + self._wall_offset)
             if self.noise:
-                voltages += self._random.normal(
-                    0, self.noise * SENSOR_SUPPLY / 2 / SENSOR_RANGE, voltages.shape)
+                voltages += self._random.normal(0, self.noise, voltages.shape) * [
+                    _volts_per_unit(PARTS_BY_NUMBER[number].law) * (number in ACCELERATION_AXES)
+                    for number in self.used_sensors]
         else:
             voltages = np.tile(np.array(self._supplies()), (len(times), 1))
         active = np.array(format.channels)

@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from icotronic_driver.laws import PARTS_BY_NUMBER, STANDARD_GRAVITY, USUAL_REFERENCE
 from icotronic_driver.simulator.scene import vibration
-from icotronic_driver.simulator.sth import SENSOR_RANGE
-from icotronic_driver.streaming import STANDARD_GRAVITY, Calibration
 from icotronic_driver.values import AdcConfiguration
 from isys_radar_driver.models import FAST, find_model
 from isys_radar_driver.simulator.scene import scene_of
@@ -24,7 +23,7 @@ from uc4000_driver.commands import STEP as ULTRASONIC_STEP
 from uc4000_driver.simulator.scene import scene_of as filling_of
 from uc4000_driver.telegram import FACTORY_ADDRESS
 
-STH_RESOLUTION = Calibration.of_range(SENSOR_RANGE).slope * STANDARD_GRAVITY  # m/s²
+STH_RESOLUTION, _ = PARTS_BY_NUMBER[1].law.factors(USUAL_REFERENCE)  # m/s²
 TIMING = 0.010  # s by which a stamp may be off
 COMMON_DELAY = 0.003  # s by which all stamps of a topic may be late
 LATEST = 3.0  # 95 % of the turns of a busy machine are not later than so many times the mean

@@ -5,8 +5,8 @@ from types import SimpleNamespace as Message
 import numpy as np
 import pytest
 
+from icotronic_driver.laws import STANDARD_GRAVITY
 from icotronic_driver.simulator.scene import vibration
-from icotronic_driver.streaming import STANDARD_GRAVITY
 from isys_radar_driver.simulator.scene import scene_of
 from msg_conversions.point_cloud import to_point_cloud
 from sensor_tools.demo import heartbeat

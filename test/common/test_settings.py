@@ -29,6 +29,7 @@ MODE = Parameter("mode", kind=str, choices={"fast": 0, "slow": 1})
 FLAG = Parameter("flag", kind=bool)
 NAME = Parameter("name", kind=str)
 NAMES = Parameter("names", kind=list)
+PAIR = Parameter("pair", kind=tuple)
 
 
 def test_on_and_off_are_words_even_where_yaml_made_them_booleans():
@@ -78,6 +79,10 @@ def test_a_good_value_comes_back_in_the_parameters_type(
     (NAME, True, "name must be a text, not True"),
     (NAMES, "front", "names must be a list of words, not 'front'"),
     (NAMES, ["front", 1], "names must be a list of words, not ['front', 1]"),
+    (PAIR, [1.0], "pair must be two numbers, not [1.0]"),
+    (PAIR, [1.0, "2"], "pair must be two numbers, not [1.0, '2']"),
+    (PAIR, [1.0, float("nan")], "pair must be two numbers, not [1.0, nan]"),
+    (PAIR, 5, "pair must be two numbers, not 5"),
     (NAMES, 5, "names must be a list of words, not 5"),
 ])
 def test_a_bad_value_says_what_is_allowed(parameter: Parameter, value: object, text: str) -> None:

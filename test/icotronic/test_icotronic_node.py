@@ -19,16 +19,16 @@ from nodes import NodeProcess, Ros
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import BatteryState, Imu, PointCloud2, Temperature
-from std_msgs.msg import Float64MultiArray
+from std_msgs.msg import Float64, Float64MultiArray
 
 from driver_common.simulator.bus import CanFrame
 from icotronic_driver import commands
 from icotronic_driver.identifier import STU_1
+from icotronic_driver.laws import STANDARD_GRAVITY
 from icotronic_driver.line import STREAM_ID
 from icotronic_driver.node import IcotronicNode, queue_complaint
 from icotronic_driver.settings import SETTINGS
 from icotronic_driver.simulator.line import SimulatedIcotronic, simulated_network
-from icotronic_driver.streaming import STANDARD_GRAVITY
 from icotronic_driver.values import AdcConfiguration
 from msg_conversions.imu_batch import from_imu_batch
 from sensor_tools import convert_imu
@@ -168,8 +168,8 @@ class Station:
 
 
 BEGINNING = {
-    "channels": "x", "axis.x": "x", "axis.y": "y", "axis.z": "z", "calibration_source": "auto",
-    "acceleration_range_g": 100.0, "sample_rate": 500.0, "linear_acceleration_stddev": 0.0,
+    "channels": "x", "axis.x": "x", "axis.y": "y", "axis.z": "z", "channel.x.sensor": "auto",
+    "channel.x.unit": "V", "sample_rate": 500.0, "linear_acceleration_stddev": 0.0,
     "time_offset": 0.0, "vibration_period": 0.0}
 
 
@@ -244,7 +244,7 @@ def test_parameters_are_what_the_sensor_reported(station):
     assert adc.sample_rate == pytest.approx(500.0, rel=0.01)
     assert station.remote.get("name", "led", "used_sensor.z", "lowest_energy.sleep_time") == [
         "Test-STH", "enabled", 3, 259200.0]
-    assert station.remote.get("calibration.acceleration_x.offset") == -100.0
+    assert station.remote.get("calibration.acceleration_x.offset") == -125.0
 
 
 def test_a_parameter_describes_itself(station):
@@ -264,7 +264,7 @@ def test_a_setting_is_written_to_the_sensor_and_rounded_to_what_it_holds(station
 
 
 @pytest.mark.parametrize(("name", "value", "reason"), [
-    ("used_sensor.x", 9, "used_sensor.x = 9: STH 1 cannot write the used sensors: not available"),
+    ("used_sensor.x", 11, "used_sensor.x = 11: STH 1 cannot write the used sensors: not available"),
     ("adc.acquisition_time", 5, "lies between two steps, the nearest are 4 cycles and 8 cycles"),
     ("adc.prescaler", 200, "allowed is 1 … 127"), ("led", "blue", "one of enabled, disabled"),
     ("name", "much too long", "at most 8 bytes in UTF-8"),
@@ -284,9 +284,9 @@ def test_what_cannot_be_set_is_refused_with_the_reason(station, name, value, rea
 
 
 def test_several_parameters_are_set_all_or_none(station):
-    result = station.remote.set_atomically({"led": "disabled", "used_sensor.y": 9})
+    result = station.remote.set_atomically({"led": "disabled", "used_sensor.y": 11})
     assert not result.successful
-    assert "used_sensor.y = 9" in result.reason
+    assert "used_sensor.y = 11" in result.reason
     assert station.remote.get("led") == "enabled"
     assert station.sensor.led
     assert station.remote.set_atomically({"led": "disabled", "used_sensor.y": 3}).successful
@@ -328,16 +328,41 @@ def test_two_channels_on_one_axis_are_an_error_in_the_log(station):
     station.process.wait_for_line("two channels are mapped to the same axis", line)
 
 
-def test_the_calibration_by_range_takes_effect_at_once(station):
-    station.set(calibration_source="range", acceleration_range_g=50.0)
-    station.wait_for_acceleration(5.0, 0.0, 0.0)
+def test_a_law_of_its_own_takes_effect_at_once(station):
+    station.set(channel__x__sensor="linear", channel__x__unit="g", channel__x__volts=[0.0, 3.3],
+                channel__x__values=[-25.0, 25.0])
+    station.wait_for_acceleration(2.0, 0.0, 0.0)  # 1.782 V
+    result = station.remote.set("channel.x.volts", [1.0, 1.0])
+    assert not result.successful
+    assert "a law needs two different volts and values" in result.reason
+
+
+def test_what_is_no_acceleration_is_published_as_what_it_is(station):
+    station.sensor.temperature = 31.0
+    temperatures = station.remote.subscribe(Temperature, "channel_x/temperature")
+    values = station.remote.subscribe(Float64, "channel_x/value")
+    imus = station.remote.subscribe(Imu, "imu/data_raw")
+    station.set(used_sensor__x=5)
+    station.ros.wait_until(lambda: temperatures)
+    assert temperatures[-1].temperature == pytest.approx(31.0, abs=0.02)
+    assert temperatures[-1].header.frame_id == "imu_link"
+    assert abs(temperatures[-1].header.stamp.sec - time.time()) < DEADLINE
+    imus.clear()
+    station.set(used_sensor__x=6)
+    station.ros.wait_until(lambda: values)
+    assert values[-1].data == pytest.approx(0.3, abs=1e-4)
+    assert imus == []
+    status = station.wait_for_status(lambda status: "photodiode" in status.values.get(
+        "law of channel x", ""))
+    assert status.values["law of channel x"].startswith("0 … 3.3 V = 0 … 1, by sensor number 6")
+    station.set(used_sensor__x=1)
 
 
 def test_a_new_calibration_factor_takes_effect_at_once(station):
     slope = station.remote.get("calibration.acceleration_x.slope")
-    station.set(calibration__acceleration_x__offset=-90.0)
+    station.set(channel__x__sensor="device", calibration__acceleration_x__offset=-115.0)
     station.wait_for_acceleration(20.0, 0.0, 0.0)
-    station.set(calibration__acceleration_x__offset=-100.0)
+    station.set(calibration__acceleration_x__offset=-125.0)
     assert station.remote.get("calibration.acceleration_x.slope") == slope
 
 
@@ -373,7 +398,8 @@ def test_diagnostics_tell_identity_link_rate_and_readings(station):
     assert float(values["sample rate asked for [Hz]"]) == 500.0
     assert 0 < float(values["bus load without stuff bits [%]"]) < float(
         values["bus load [%]"]) < 5
-    assert "by the device's factors" in values["calibration of channel x"]
+    assert values["law of channel x"].startswith(
+        "0.33 … 2.97 V = -100 … 100 g, by sensor number 1 (ADXL1001, x); 0.0374")
     assert (values["rssi [dBm]"], values["lost frames"]) == ("-52", "0")
     assert int(values["frames"]) > 0
 
@@ -397,7 +423,7 @@ def test_a_scan_tells_which_sensors_are_in_range(station):
 def test_the_eeproms_can_be_read_as_text(station):
     text = station.remote.trigger("read_eeprom").message
     for line in ("System Configuration (page 0)", "  EEPROM Status: 172", "  STH Name: Test-STH",
-                 "Calibration (page 8)", "  Acceleration X: Offset: -100",
+                 "Calibration (page 8)", "  Acceleration X: Offset: -125",
                  "  Sleep Time 1: 300 s"):
         assert line in text.splitlines()
     assert "  STU Name: Valerie" in station.remote.trigger("read_stu_eeprom").message
@@ -746,9 +772,10 @@ def test_the_states_of_the_lifecycle_are_those_of_the_sensor(ros, start, launch)
 def test_a_simulated_sensor_comes_with_the_node(ros, launch, samples):
     process = launch({"can_interface": "sim", "channels": "xyz", "sample_rate": 200.0,
                       "sensor_mac": "08-6b-d7-01-de-81"})
-    process.wait_for_line('connected to "Test-STH" (08:6B:D7:01:DE:81), firmware 2.1.10; channels '
-                          "x calibrated by the device's factors, y calibrated by the device's "
-                          "factors, z calibrated by the device's factors;")
+    process.wait_for_line(
+        'connected to "Test-STH" (08:6B:D7:01:DE:81), firmware 2.1.10; channels '
+        "x: 0.33 … 2.97 V = -100 … 100 g, by sensor number 1 (ADXL1001, x); "
+        "y: 0.1 … 1.7 V = -40 … 40 g, by sensor number 2 (ADXL358C, y); z: ")
     ros.wait_until(samples.is_matched)
     samples.until(100)
     _, accelerations = samples.table()
@@ -764,19 +791,19 @@ def test_a_simulated_sensor_comes_with_the_node(ros, launch, samples):
 def test_wanted_settings_are_written_and_what_is_unknown_is_named(ros, start, launch):
     server = start()
     process = launch(at(server, led="disabled", speed=5, **{
-        "adc.prescaler": 5, "used_sensor.x": 9, "adc.prescale": 4}))
+        "adc.prescaler": 5, "used_sensor.x": 11, "adc.prescale": 4}))
     process.wait_for_line("connected to")
     process.wait_for_line("wrote led: enabled → disabled, adc.prescaler: 2 → 5"
                           if "wrote led" in process.log else
                           "wrote adc.prescaler: 2 → 5")
-    process.wait_for_line("used_sensor.x = 9: STH 1 cannot write the used sensors: not available")
+    process.wait_for_line("used_sensor.x = 11: STH 1 cannot write the used sensors: not available")
     process.wait_for_line("parameter speed: this driver has no such parameter")
     process.wait_for_line('no such parameter; did you mean "adc.prescaler"?')
     assert (server.network.sensors[0].adc.prescaler, server.network.sensors[0].led) == (5, False)
     status = ros.wait_for_status(STATUS, lambda status: "used_sensor.x differs" in status.values)
     assert status.level == WARN
     assert "1 settings are not as wanted" in status.message
-    assert status.values["used_sensor.x differs"] == "wanted 9, reported 1"
+    assert status.values["used_sensor.x differs"] == "wanted 11, reported 1"
     process.stop()
 
 
@@ -789,24 +816,34 @@ def test_the_load_of_a_slow_bus_is_an_error_in_the_diagnostics(ros, start, launc
     process.stop()
 
 
+def test_a_healthy_sensor_is_ok_with_all_defaults(ros, start, launch):
+    server = start()
+    process = launch(at(server))
+    process.wait_for_line("of the bus, more than 40%")
+    status = ros.wait_for_status(STATUS, lambda status: "0 frames lost" in status.message)
+    assert status.level == OK
+    server.network.faults.foreign = 100.0  # another program on the bus
+    status = ros.wait_for_status(STATUS, lambda status: status.level == WARN)
+    assert "of the bus, more than 40%" in status.message
+    process.stop()
+
+
 def test_an_odd_calibration_in_the_sensor_is_shown_told_and_not_used(ros, start, launch):
     server = start()
     simulated = server.network.sensors[0]
     simulated.eeprom["Acceleration X: Slope"] = math.nan
     simulated.vibration = constant(40.0, 0.0, 0.0)
-    process = launch(at(server, acceleration_range_g=50.0,
-                        sample_rate=200.0))
+    process = launch(at(server, sample_rate=200.0, **{"channel.x.sensor": "device"}))
     process.wait_for_line("channel x: no plausible calibration (the device's factors: slope nan and"
-                          " offset -100 are not numbers")
+                          " offset -125 are not numbers")
     process.wait_for_line("connected to")
     station = Station(ros, process, server)
-    station.wait_for_acceleration(20.0, 0.0, 0.0)
+    station.wait_for_acceleration(40.0, 0.0, 0.0)
     status = ros.wait_for_status(STATUS, lambda status: status.level == WARN)
-    assert status.message == ("no plausible calibration of channel x; it is a guess by "
-                              "acceleration_range_g")
+    assert status.message.startswith("channel x: no plausible calibration (the device's factors: ")
     ros.wait_until(lambda: "name" in station.remote.names())
     assert math.isnan(station.remote.get("calibration.acceleration_x.slope"))
-    station.set(calibration__acceleration_x__slope=200 / 65535)
+    station.set(calibration__acceleration_x__slope=250 / 65535)
     station.wait_for_acceleration(40.0, 0.0, 0.0)
     ros.wait_for_status(STATUS, lambda status: status.level == OK)
     process.stop()

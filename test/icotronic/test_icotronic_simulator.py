@@ -256,7 +256,7 @@ def test_errors() -> None:
                                          b"\x01" + bytes(7))
     assert unknown.error_id == 0x0005_04F
     refusals = [
-        (commands.WRITE_USED_SENSORS.request(STH, UsedSensors(9, 1, 1)), "not available"),
+        (commands.WRITE_USED_SENSORS.request(STH, UsedSensors(11, 1, 1)), "not available"),
         (commands.READ_EEPROM.with_payload(STH, b"\0\0\5", bytes), "unsupported format"),
         (commands.READ_EEPROM.with_payload(STH, b"\0\xff\2", bytes), "unsupported format"),
         (commands.WRITE_ADC.with_payload(STH, b"\x80\0\4\6\x42", bytes), "unsupported format"),
@@ -335,7 +335,7 @@ def test_calibration_lies_in_the_eeprom() -> None:
     host = Host().connect()
     field = STH_EEPROM["Acceleration Z: Offset"]
     element = CalibrationElement.ACCELERATION
-    assert host.ask(commands.READ_CALIBRATION_D.request(STH, element, 3)) == -100.0
+    assert host.ask(commands.READ_CALIBRATION_D.request(STH, element, 3)) == -45.0
     host.ask(commands.WRITE_CALIBRATION_D.request(STH, element, 3, -50.0))
     read = commands.READ_EEPROM.request(STH, field.page, field.offset, field.length)
     assert host.ask(read) == b"\x00\x00\x48\xc2"
@@ -375,7 +375,7 @@ def test_measurements() -> None:
     sensor.vibration = lambda times: np.zeros((len(times), 3))
     sensor.temperature, sensor.battery = -3.25, 2.9
     assert host.ask(commands.READ_TEMPERATURE.request(STH)) == -3.25
-    assert host.ask(commands.read_acceleration(STH)) == (32768, 32768, 32768)
+    assert host.ask(commands.read_acceleration(STH)) == (32768, 17873, 17873)  # 1.65 and 0.9 V
     (raw,) = host.ask(commands.read_voltage(STH))
     assert raw == round(2.9 / 5.7 / 3.3 * 65535)
     element = CalibrationElement
@@ -390,9 +390,10 @@ def test_measurements() -> None:
                                       CalibrationMethod.DEACTIVATE))
     host.ask(commands.WRITE_ADC.request(STH, AdcConfiguration(reference_voltage=6.6)))
     assert host.ask(commands.read_acceleration(STH, X)) == (16384,)
-    host.ask(commands.WRITE_USED_SENSORS.request(STH, UsedSensors(4, 0, 5)))
-    temperature, acceleration, piezo = host.ask(commands.read_acceleration(STH))
-    assert (temperature, acceleration, piezo) == (5243, 16384, 19005)
+    host.ask(commands.WRITE_USED_SENSORS.request(STH, UsedSensors(5, 0, 10)))
+    volts = 0.772 + (-3.25 + 40) * 0.495 / 165, 0.9, 0.509  # 2.9 V of the battery
+    assert host.ask(commands.read_acceleration(STH)) == tuple(
+        round(one / 6.6 * 65535) for one in volts)
 
 
 # --- streams ---

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from driver_common.errors import FrameError
+from icotronic_driver.laws import Calibration
 from icotronic_driver.streaming import (
     STOP,
-    Calibration,
     StreamBatch,
     StreamDecoder,
     StreamFormat,
@@ -333,13 +333,6 @@ def test_bus_load_of_can_2() -> None:
 def test_supply_voltage() -> None:  # errata C8; figures of the vendor's client
     assert supply_voltage(11000, 3.3) == pytest.approx(3.157, abs=0.001)
     assert supply_voltage(1 << 15, 1.8) == pytest.approx(5.130, abs=0.001)
-
-
-def test_calibration_of_a_range() -> None:  # errata C9
-    calibration = Calibration.of_range(100)
-    assert calibration.slope == pytest.approx(200 / 65535)
-    assert calibration.offset == -100
-    assert calibration.fault == ""
 
 
 @pytest.mark.parametrize(("slope", "offset", "words"), [
