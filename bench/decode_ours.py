@@ -41,7 +41,7 @@ def main() -> None:
     """Decode the frames."""
     port, first, last = map(int, sys.argv[1:])
     bus = IcotronicBus(Line("socketcand", "can0", 1_000_000, ["host=127.0.0.1", f"port={port}"]),
-                       Options(sensor_name="Bench", status_period=1e6), Counter(first, last))
+                       Options(sensor_name="Bench", status_period=0.0), Counter(first, last))
     bus.open()
     bus.set_active(True)
     while True:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from driver_common.errors import DriverError, FrameError, NoAnswerError, RefusedError
 from driver_common.sample_clock import HostClock, SampleClock
-from driver_common.settings import Value
+from driver_common.settings import Value, read_settings
 from icotronic_driver import commands
 from icotronic_driver.access import READINGS, Access, Survey
 from icotronic_driver.identifier import STH_1
@@ -27,6 +27,10 @@ LISTEN_TIME = 0.05  # s that jobs of others wait at most
 KEEP_ALIVE = 1.0  # s between checks of a connection without a stream
 SILENCE = 1.0  # s without a frame after which the stream is looked after
 LAW_SETTINGS = ("calibration.", "adc.reference", "used_sensor.")  # on them laws depend
+RATE_TIME = 3.0  # s in which a rate is measured
+RATE_FRAMES = 100  # and frames
+RATE_DEVIATION = 0.03  # by which it may differ from that of the ADC settings
+SHORTEST_PERIOD = 0.5  # s in which all readings can be taken
 ON_THE_WAY = 0.05  # s without a frame after which none of a stopped stream will come
 
 
@@ -52,6 +56,8 @@ class Acquisition:
         self._last_frame = 0.0
         self._host_clock = HostClock()
         self._told_rate = ""
+        self._told_pace = False
+        self._pace_since = 0.0, 0  # time in s and number of a frame
         self._next_reading = 0.0
         self._readings = itertools.cycle(READINGS)
 
@@ -160,7 +166,7 @@ class Acquisition:
             if not self._access.is_connected():
                 raise NoAnswerError("the sensor disconnected")
             sensor.due = time.monotonic() + KEEP_ALIVE
-        if time.monotonic() >= self._next_reading:
+        if sensor.options.status_period and time.monotonic() >= self._next_reading:
             self._read_next()
 
     def restart(self) -> None:
@@ -197,6 +203,7 @@ class Acquisition:
         sensor.clock = SampleClock(sensor.sample_rate)
         self._line.on_stream = self._stream_handler(sensor)
         self._last_frame = time.monotonic()
+        self._pace_since, self._told_pace = (self._last_frame, 0), False
         try:
             self._line.request(commands.START_ACCELERATION.request(STH_1, form),
                                self._longest_silence / 2)  # the first frame is the answer
@@ -238,8 +245,35 @@ class Acquisition:
         self._sensor.pauses.end(LISTEN_TIME, decoder.statistics.lost - lost)
         if decoder.statistics.frames != frames:
             self._last_frame = time.monotonic()
+            self._check_pace(decoder)
         elif time.monotonic() - self._last_frame > self._longest_silence:
             self._look_after_stream()
+
+    def _check_pace(self, decoder: StreamDecoder) -> None:
+        """Read the ADC settings again where frames come at another pace than these say."""
+        (since, first), last = self._pace_since, self._last_frame
+        if last - since < RATE_TIME or decoder.number - first < RATE_FRAMES:
+            return
+        self._pace_since = last, decoder.number
+        expected = decoder.format.frame_rate(self._sensor.adc.sample_rate)
+        share = (decoder.number - first) / (last - since) / expected
+        if abs(share - 1) > RATE_DEVIATION:
+            self._look_after_pace(share)
+
+    def _look_after_pace(self, share: float) -> None:
+        """React to a stream that comes at `share` of its pace."""
+        sensor = self._sensor
+        before = sensor.adc
+        sensor.values |= read_settings(self._access, [
+            setting for name, setting in sensor.settings.items() if name.startswith("adc.")])
+        if sensor.adc != before:
+            self._note("something else changed the ADC settings; starting the stream again",
+                       warning=True)
+            self.restart()
+        elif not self._told_pace:
+            self._told_pace = True
+            self._note(f"the stream comes at {share * sensor.sample_rate:.4g} samples per second, "
+                       f"not at {sensor.sample_rate:.4g} as its ADC settings say", warning=True)
 
     @property
     def _longest_silence(self) -> float:
@@ -270,7 +304,7 @@ class Acquisition:
     def _read_next(self) -> None:
         """Read one of the things that are read now and then, of those that the sensor has."""
         sensor = self._sensor
-        period = sensor.options.status_period
+        period = max(SHORTEST_PERIOD, sensor.options.status_period)
         self._next_reading = time.monotonic() + period / len(READINGS)
         reading = next(self._readings)
         if reading.name in sensor.readable:

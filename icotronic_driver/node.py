@@ -125,9 +125,10 @@ class IcotronicNode(DeviceNode, Listener):
                live=True, description="Time whose samples are one message on imu/batch; 0 = off"),
         Option("vibration_period", kind=float, default=0.0, minimum=0.0, maximum=10.0, unit="s",
                live=True, description="Time whose samples make one message on vibration; 0 = off"),
-        Option("status_period", kind=float, default=8.0, minimum=0.5, maximum=3600.0, unit="s",
+        Option("status_period", kind=float, default=8.0, minimum=0.0, maximum=3600.0, unit="s",
                live=True, description="Time in which battery, temperature, RSSI, states and "
-                                      "counters are read once"),
+                                      "counters are read once, 0.5 s at least; 0 = never, so that "
+                                      "nothing disturbs the stream"),
         Option("command", kind=str, default="read_state", live=True,
                description="What the service ~/execute_command asks: the name of a command and "
                            "its arguments, such as write_state 2"),

@@ -79,7 +79,8 @@ class Options(DeviceOptions):
         channels: Which channels are streamed.
         sample_rate: Wanted values/s of each channel; 0 = as the ADC settings say.
         laws: How each channel gets its law.
-        status_period: Time in s in which battery, temperature, RSSI and counters are read once.
+        status_period: Time in s in which battery, temperature, RSSI and counters are read once; 0 =
+            never.
         may_wait: Time in s for which frames may wait for each other; nobody wants each at once.
     """
 

@@ -55,15 +55,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def open_simulation(options: argparse.Namespace) -> Simulation:
     """Start the system; raises DriverError."""
+    used = _used_sensors(options.used_sensors)
     server = simulated_network(options.name or ["Test-STH"], listen=options.listen,
                                channel=options.channel, calibrated=not options.uncalibrated,
                                can_fd=options.can_fd)
     network = server.network
     set_faults(network.faults, FAULTS, options)
     network.stay_silent(options.silent_on)
-    used = tuple(numbers(options.used_sensors, "--used-sensors"))
-    if len(used) != 3 or not set(used) <= PARTS_BY_NUMBER.keys():
-        raise SettingError(f"--used-sensors takes three numbers 1 ... 10, not {used}")
     for sensor in network.sensors:
         sensor.first_sensors = sensor.used_sensors = used
         sensor.noise = options.noise
@@ -86,3 +84,11 @@ def open_simulation(options: argparse.Namespace) -> Simulation:
          "padding": switch([network.faults], "padding"), "silent-on": network.stay_silent,
          "away": away, "back": back, "power-cycle": power_cycle,
          **fault_commands(network.faults, FAULTS)}, server.close)
+
+
+def _used_sensors(text: str) -> tuple[int, int, int]:
+    used = numbers(text, "--used-sensors")
+    if len(used) != 3 or not set(used) <= PARTS_BY_NUMBER.keys():
+        raise SettingError(f"--used-sensors takes three numbers 1 ... 10, not {text}")
+    x, y, z = used
+    return x, y, z

@@ -154,7 +154,9 @@ class SimulatedStu(SimulatedNode):
         return head + handler(payload, now).ljust(6, b"\0")
 
     def _device(self, number: int) -> SimulatedSth | None:
-        return list(self.found)[number] if self.active and number < len(self.found) else None
+        """Return a device by its number, also one that an earlier activation showed."""
+        devices = list(self.found) or self._known
+        return devices[number] if self.active and number < len(devices) else None
 
     def _is_new(self, sensor: SimulatedNode, now: float) -> bool:
         return (isinstance(sensor, SimulatedSth) and self.connected is None
@@ -180,9 +182,7 @@ class SimulatedStu(SimulatedNode):
         return node._name_part(payload[0])
 
     def _connect_number(self, payload: bytes, now: float) -> bytes:
-        number = payload[1]
-        known = self._known[number] if number < len(self._known) else None
-        return bytes((self._connect(self._device(number) or known, now),))
+        return bytes((self._connect(self._device(payload[1]), now),))
 
     def _connect_mac(self, payload: bytes, now: float) -> bytes:
         """Answer with the address once, when the connection stands, else with zeros."""

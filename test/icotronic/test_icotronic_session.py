@@ -916,6 +916,47 @@ def test_an_answer_that_waited_for_a_busy_host_counts(connect, monkeypatch):
     assert host.bus.line.request(commands.READ_LED.request(STH_1), 0.05, attempts=1)
 
 
+@pytest.mark.parametrize(("mode", "wanted", "prescaler", "differing"), [
+    ("push", {"adc.prescaler": 2}, 2, {}), ("push", {}, 5, {}),
+    ("leave", {"adc.prescaler": 2}, 5, {}),
+    ("check", {"adc.prescaler": 2}, 5, {"adc.prescaler": (2, 5)})])
+def test_adc_settings_that_something_else_changed_are_noticed_by_the_pace(
+        connect, monkeypatch, mode, wanted, prescaler, differing):
+    monkeypatch.setattr(acquisition, "RATE_TIME", 0.3)
+    host, network, simulated = connect(wanted=wanted, config_mode=mode)
+    host.stream()
+    with network.lock:
+        simulated._adc_command(bytes.fromhex("80 05 04 06 42"), time.monotonic())
+    host.until(lambda: len(host.heard.streams) == 2)
+    assert simulated.adc.prescaler == host.sensor.adc.prescaler == prescaler
+    assert host.sensor.differing == differing
+    assert host.heard.warnings[0] == (
+        "something else changed the ADC settings; starting the stream again")
+    stream = host.more(300)
+    assert_true(simulated, stream)
+
+
+def test_a_pace_that_the_adc_settings_do_not_explain_is_told_once(connect, monkeypatch):
+    monkeypatch.setattr(acquisition, "RATE_TIME", 0.2)
+    host, _, simulated = connect()
+    simulated.clock_error = -0.4
+    host.stream()
+    host.until(lambda: host.heard.warnings)
+    host.more(1500)
+    (warning,) = [text for text in host.heard.warnings if "ADC" in text]
+    assert "samples per second, not at 9524 as its ADC settings say" in warning
+    assert len(host.heard.streams) == 1
+
+
+def test_nothing_is_read_while_streaming_where_that_is_wanted(connect, monkeypatch):
+    host, network, _ = connect(status_period=0.0)
+    host.stream()
+    asked = []
+    monkeypatch.setattr(network, "_ask", lambda *args: asked.append(args))
+    host.more(2000)
+    assert asked == []
+
+
 def test_a_reading_that_the_firmware_lacks_is_left_out(start, listen):
     server = start()
     server.network.sensors[0].refuse.add((STREAMING, 0x20))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import socket
 import subprocess
@@ -16,7 +17,13 @@ import pytest
 from icotronic_examples import EXAMPLES, SELF, STH, STU, Example
 from test_icotronic_commands import request_of
 
-from driver_common.errors import DriverError, LinkError, RefusedError, WrongDeviceError
+from driver_common.errors import (
+    DriverError,
+    LinkError,
+    RefusedError,
+    SettingError,
+    WrongDeviceError,
+)
 from driver_common.simulator import bus as simulated_bus
 from driver_common.simulator.bus import CanFrame
 from icotronic_driver import commands
@@ -35,6 +42,7 @@ from icotronic_driver.values import (
     NetworkState,
     UsedSensors,
 )
+from sensor_tools import simulate_icotronic
 
 T = TypeVar("T")
 
@@ -776,3 +784,38 @@ def test_the_command_line() -> None:
     assert lines[0].startswith("127.0.0.1:")
     assert "Test-STH (08:6B:D7:01:DE:81), Zwei (08:6B:D7:01:DE:82)" in lines[0]
     assert [line.split(":")[0] for line in lines[1:]] == ["done"] * 6 + ["cannot do 'fly'"]
+
+
+def test_what_the_sensors_are_can_be_said_on_the_command_line(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    servers: list[SimulatedIcotronic] = []
+    monkeypatch.setattr(simulate_icotronic, "simulated_network", lambda *args, **options: (
+        servers.append(simulated_network(*args, **options)) or servers[-1]))
+    parser = argparse.ArgumentParser()
+    simulate_icotronic.add_arguments(parser)
+    simulation = simulate_icotronic.open_simulation(parser.parse_args([
+        "--listen", "127.0.0.1:0", "--used-sensors", "10,6,3", "--at-rest", "--noise", "0.1",
+        "--silent-on", "unused", "--connect-time", "15", "--newness", "2"]))
+    try:
+        network = servers[0].network
+        sensor = network.sensors[0]
+        assert (sensor.used_sensors, sensor.noise) == ((10, 6, 3), 0.1)
+        assert sensor.vibration(np.zeros(1)).tolist() == [[0.0, 0.0, 1.0]]
+        assert (network.faults.connect_time, network.faults.newness) == (15.0, 2.0)
+        assert all((commands.STATISTICS, 0x00) in node.ignore for node in (network.stu, sensor))
+        simulation.commands["silent-on"]("nothing")
+        assert not sensor.ignore
+        simulation.commands["padding"]("on")
+        assert network.faults.padding
+        with pytest.raises(SettingError, match="no silence on 'fly', only on nothing, unused"):
+            simulation.commands["silent-on"]("fly")
+    finally:
+        simulation.close()
+
+
+@pytest.mark.parametrize("numbers", ["1,2", "1,2,11", "0,1,2"])
+def test_only_sensors_that_there_are_can_be_on_the_channels(numbers: str) -> None:
+    parser = argparse.ArgumentParser()
+    simulate_icotronic.add_arguments(parser)
+    with pytest.raises(SettingError, match=r"takes three numbers 1 \.\.\. 10"):
+        simulate_icotronic.open_simulation(parser.parse_args(["--used-sensors", numbers]))
