@@ -41,6 +41,8 @@ GONE = Advice("it is gone", "is it plugged in?")
 NOBODY_LISTENS = Advice("nothing listens there", "check host and port{where}")
 SLOW_ADAPTER = Advice("its driver hands over what it received only every {milliseconds} ms",
                       "as root: 'echo 1 > {file}'")
+NO_LOW_LATENCY = Advice("its driver has no mode of low latency",
+                        "where answers come late, take an adapter that has one (such as FTDI's)")
 NOISE = Advice("bytes arrive that nobody asked for ({count} in {seconds:g} s)",
                "something else talks on this line, or a device sends by itself; disconnect it")
 ECHO = Advice("the line returns what is sent",

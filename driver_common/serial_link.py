@@ -39,6 +39,7 @@ class SerialLink:
 
     Attributes:
         time: The host's time in ns when the last write began or the last read ended.
+        has_low_latency: Whether the port's driver hands over at once what it receives.
 
     Args:
         port: Device path or URL.
@@ -77,8 +78,10 @@ class SerialLink:
         except (serial.SerialException, ValueError, TypeError, OSError, re.error) as error:
             raise LinkError(f"cannot open {self.port}: {_reason(self.port, error)}") from error
         # Not on a pseudo-terminal, a socket, or with every driver.
+        self.has_low_latency = False
         with contextlib.suppress(AttributeError, ValueError, OSError, NotImplementedError):
             port.set_low_latency_mode(True)
+            self.has_low_latency = True
         # A lock keeps out who asks for it, this one everybody but root.
         with contextlib.suppress(AttributeError, ValueError, OSError, NotImplementedError):
             fcntl.ioctl(port.fileno(), termios.TIOCEXCL)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -182,6 +182,24 @@ FAMILIES: Mapping[str, Family] = {family.name: family for family in (
            _has_not("command that restores its factory settings")),
 )}
 SERIAL = ("uc4000", "isys")  # in this order: a radar keeps quiet at the rate of the others
+
+
+def search(place: SerialPlace | CanPlace, families: Iterable[Family],
+           progress: Progress) -> list[Result]:
+    """Return what is at a place: what the search for the first family that is there brings.
+
+    Where nobody answers it is what all of them bring.
+
+    Raises:
+        LinkError: The port or the bus failed.
+    """
+    everything: list[Result] = []
+    for family in families:
+        results = list(family.search(place, progress))
+        if any(isinstance(one, Found) for one in results):
+            return results
+        everything += [one for one in results if one not in everything]
+    return everything
 
 
 def families_of(place: SerialPlace | CanPlace, only: str = "") -> list[Family]:

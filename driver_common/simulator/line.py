@@ -172,11 +172,11 @@ class SimulatedLine:
         heapq.heappush(self._due, (due, next(self._order), action))
 
     def _receive(self, data: bytes, now: float) -> None:
+        if self.faults.echo:  # made by the adapter, so at its own rate
+            self._schedule(now, data)
         speed = self._transport.speed()
         if speed and speed != self._device.baud_rate:
             data = bytes(byte ^ 0x5A for byte in data)  # what a wrong baud rate makes of them
-        if self.faults.echo:
-            self._schedule(now, data)
         for delay, piece in self.faults.hurt(data):
             due = max(now + delay, self._arrived_until)  # nothing overtakes what is under way
             self._arrived_until = due + len(piece) * self._byte_time

@@ -10,7 +10,7 @@ import click
 from driver_common.errors import LinkError
 from sensor_tools.cli.output import print_findings, print_json, print_table, progress_bar
 from sensor_tools.cli.places import Wanted, place_options
-from sensor_tools.families import families_of
+from sensor_tools.families import families_of, search
 from sensor_tools.node_files import write_files
 from sensor_tools.search.place import Place, all_places
 from sensor_tools.search.result import Finding, Found, Progress, Result
@@ -33,7 +33,7 @@ def scan(wanted: Wanted, as_json: bool, files: Path | None) -> int:
     places = [wanted.place] if wanted.place else all_places()
     with progress_bar() as progress:
         results = [result for place in places
-                   for result in search(place, wanted.family, progress)]
+                   for result in _search(place, wanted.family, progress)]
     found = [one for one in results if isinstance(one, Found)]
     findings = [one for one in results if isinstance(one, Finding)]
     if as_json:
@@ -47,18 +47,12 @@ def scan(wanted: Wanted, as_json: bool, files: Path | None) -> int:
     return 0 if any(one.is_sensor for one in found) else 1
 
 
-def search(place: Place, family: str, progress: Progress) -> list[Result]:
-    """Return what is at a place; of the families on a serial port, the first that answers."""
-    results: list[Result] = []
+def _search(place: Place, family: str, progress: Progress) -> list[Result]:
+    """Return what is at a place, and be it that it cannot be opened."""
     try:
-        for one in families_of(place, family):
-            results += one.search(place, progress)
-            if any(isinstance(result, Found) for result in results):
-                break
+        return search(place, families_of(place, family), progress)
     except LinkError as error:
-        cause, _, remedy = str(error).partition("; ")
-        results.append(Finding(str(place), "link", cause, remedy))
-    return results
+        return [Finding.of_error(place, error)]
 
 
 def _print(places: Sequence[Place], found: Sequence[Found], findings: Sequence[Finding]) -> None:

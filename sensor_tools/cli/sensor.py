@@ -11,9 +11,9 @@ from driver_common.errors import NoAnswerError, WrongDeviceError
 from sensor_tools.cli.output import progress_bar
 from sensor_tools.cli.places import Wanted, require_place
 from sensor_tools.cli.values import value_of
-from sensor_tools.families import FAMILIES, Bus, Device, Family, families_of
+from sensor_tools.families import FAMILIES, Bus, Device, Family, families_of, search
 from sensor_tools.measurements import Take, ignore
-from sensor_tools.search.result import Finding, Found, Progress
+from sensor_tools.search.result import Finding, Found
 
 REACH_TIME = 30.0  # s in which a sensor must be connected; by radio it can take 20
 
@@ -78,7 +78,8 @@ def find(wanted: Wanted) -> Found:
     """
     place = require_place(wanted)
     with progress_bar() as progress:
-        found, findings = _search(wanted, progress)
+        results = search(place, families_of(place, wanted.family), progress)
+    found = [one for one in results if isinstance(one, Found) and one.is_sensor]
     fitting = [one for one in found if _fits(one, wanted)]
     if len(fitting) == 1:
         return fitting[0]
@@ -90,23 +91,10 @@ def find(wanted: Wanted) -> Found:
     if found:
         there = "; ".join(map(str, found))
         raise WrongDeviceError(f"on {place} there is no such sensor, but {there}")
-    wrong = [f"{finding.cause}; {finding.remedy}".strip("; ") for finding in findings
-             if finding.is_wrong]
+    wrong = [f"{one.cause}; {one.remedy}".rstrip("; ") for one in results
+             if isinstance(one, Finding) and one.is_wrong]
     raise NoAnswerError(f"no sensor answers on {place}; "
                         + ("; ".join(wrong) or advice.SILENCE_RS485.text()))
-
-
-def _search(wanted: Wanted, progress: Progress) -> tuple[list[Found], list[Finding]]:
-    """Return the sensors and what is wrong, of the first family that has any."""
-    place = require_place(wanted)
-    findings: list[Finding] = []
-    for family in families_of(place, wanted.family):
-        results = list(family.search(place, progress))
-        findings += [one for one in results if isinstance(one, Finding)]
-        found = [one for one in results if isinstance(one, Found) and one.is_sensor]
-        if found:
-            return found, findings
-    return [], findings
 
 
 def _fits(found: Found, wanted: Wanted) -> bool:

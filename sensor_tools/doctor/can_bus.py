@@ -31,8 +31,7 @@ def examine(place: CanPlace, wanted: Wanted, progress: Progress) -> Iterator[Fin
             else:
                 yield Finding(str(place), "stationary unit", f"{result}", is_wrong=False)
     except LinkError as error:
-        cause, _, remedy = str(error).partition("; ")
-        yield Finding(str(place), "link", cause, remedy)
+        yield Finding.of_error(place, error)
         return
     yield from _compare(place, wanted, found)
 

@@ -12,7 +12,7 @@ from driver_common import advice
 from driver_common.errors import LinkError
 from driver_common.serial_link import SerialLink
 from sensor_tools.cli.places import Wanted
-from sensor_tools.families import FAMILIES, SERIAL
+from sensor_tools.families import FAMILIES, SERIAL, search
 from sensor_tools.search.place import SerialPlace
 from sensor_tools.search.result import Finding, Found, Progress
 
@@ -30,8 +30,7 @@ def examine(place: SerialPlace, wanted: Wanted, progress: Progress) -> Iterator[
         yield from _examine_line(place)
         yield from _examine_sensors(place, wanted, progress)
     except LinkError as error:
-        cause, _, remedy = str(error).partition("; ")
-        yield Finding(str(place), "link", cause, remedy)
+        yield Finding.of_error(place, error)
 
 
 def _examine_line(place: SerialPlace) -> Iterator[Finding]:
@@ -39,7 +38,7 @@ def _examine_line(place: SerialPlace) -> Iterator[Finding]:
     link = SerialLink(place.port, place.baud_rate or LISTEN_RATE)
     try:
         yield Finding(str(place), "link", "opens, and no other program uses it", is_wrong=False)
-        yield from _examine_latency(place)
+        yield from _examine_latency(place, link)
         heard, end = 0, time.monotonic() + LISTEN_TIME
         while (remaining := end - time.monotonic()) > 0:
             heard += len(link.read(remaining))
@@ -49,34 +48,35 @@ def _examine_line(place: SerialPlace) -> Iterator[Finding]:
         link.close()
 
 
-def _examine_latency(place: SerialPlace) -> Iterator[Finding]:
+def _examine_latency(place: SerialPlace, link: SerialLink) -> Iterator[Finding]:
     """Yield how long the adapter's driver holds bytes back, after low latency was asked for."""
-    file = TTYS / Path(place.port).resolve().name / "device" / "latency_timer"
+    device = TTYS / Path(place.port).resolve().name / "device"
+    file = device / "latency_timer"
+    if not device.exists():  # a pseudo-terminal, or a port elsewhere
+        return
     with contextlib.suppress(OSError, ValueError):
         milliseconds = int(file.read_text())
         if milliseconds > LONGEST_LATENCY:
             yield Finding.of(place, "latency", advice.SLOW_ADAPTER, milliseconds=milliseconds,
                              file=file)
+        return
+    if not link.has_low_latency:
+        yield Finding.of(place, "latency", advice.NO_LOW_LATENCY, is_wrong=False)
 
 
 def _examine_sensors(place: SerialPlace, wanted: Wanted, progress: Progress) -> Iterator[Finding]:
     """Yield who answers, and whether it is who should."""
     anywhere = dataclasses.replace(place, baud_rate=0)
-    names = sorted(SERIAL, key=lambda name: name != wanted.family)  # the wanted one first
-    wrong = False
-    for name in names:
-        found = []
-        for result in FAMILIES[name].search(anywhere, progress):
-            if isinstance(result, Found):
-                found.append(result)
-            else:
-                wrong = wrong or result.is_wrong
-                yield result
-        if found:
-            yield from _compare(place, wanted, found)
-            return
-    if not wrong:
-        yield Finding.of(place, "answers", advice.NOTHING_ANSWERS)
+    families = [FAMILIES[name] for name in sorted(SERIAL, key=lambda name: name != wanted.family)]
+    results = search(anywhere, families, progress)
+    findings = [one for one in results if isinstance(one, Finding)]
+    yield from findings
+    found = [one for one in results if isinstance(one, Found)]
+    if found:
+        yield from _compare(place, wanted, found)
+    elif not any(finding.is_wrong for finding in findings):
+        yield Finding.of(place, "answers", advice.SILENCE_BEHIND_ECHO if findings
+                         else advice.NOTHING_ANSWERS)
 
 
 def _compare(place: SerialPlace, wanted: Wanted, found: list[Found]) -> Iterator[Finding]:

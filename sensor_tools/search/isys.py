@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 from driver_common import advice
-from driver_common.errors import DriverError, LinkError, RefusedError, WrongDeviceError
+from driver_common.errors import DriverError, LinkError, WrongDeviceError
 from isys_radar_driver import commands
 from isys_radar_driver.access import Access
 from isys_radar_driver.frames import (
@@ -35,6 +36,7 @@ ANSWER_SIZE = 30  # bytes of question and answer
 LAST_ANSWER_TIME = 0.1  # s for those that are late
 SWEEP_STEPS = 16  # in the progress bar
 DAMAGE = 4  # bytes; less is a glitch
+SOCKET = "socket://"
 
 
 def search(place: SerialPlace, progress: Progress,
@@ -47,28 +49,31 @@ def search(place: SerialPlace, progress: Progress,
         addresses: Those that are asked one by one where several radars answer at once.
     """
     rates = (place.baud_rate,) if place.baud_rate else BAUD_RATES
-    if "://" in place.port:
+    if place.port.startswith(SOCKET):
         rates = rates[:1]  # the line is somewhere else, and has the rate that it has
     progress.expect(len(rates))
     line = Line(place.port)
     line.open(rates[0])
-    garbage = False
+    garbage = echo = False
     try:
         for rate in rates:
             progress.step(f"{place.port}: iSYS at {rate} Bd")
             line.link.baud_rate = rate
-            found, damaged = _ask_all(line)
-            garbage = garbage or damaged
-            if damaged and addresses:
+            heard = _ask_all(line)
+            found, echo = heard.addresses, echo or heard.echo
+            garbage = garbage or heard.is_unclear
+            if heard.is_unclear and addresses:
                 found = _sweep(line, addresses, progress) or found
                 addresses = ()  # once is enough: only at the right rate does anybody answer
-            for address in found:
+            for address in sorted(found):
                 yield _identified(place, line, address)
             if found:
                 garbage = False
                 break
     finally:
         line.close()
+    if echo:
+        yield Finding.of(place, "echo", advice.ECHO, is_wrong=False)
     if garbage:
         yield Finding.of(place, "answers", advice.GARBAGE, family="iSYS")
 
@@ -101,56 +106,66 @@ def _identified(place: SerialPlace, line: Line, address: int) -> Result:
                  parameters={"address": address, "serial_baud": line.link.baud_rate})
 
 
-def _ask_all(line: Line) -> tuple[list[int], bool]:
-    """Return the addresses that answer a broadcast, and whether more may be hidden."""
-    before = _damage(line)
-    frames = line.broadcast(commands.READ_ADDRESS.request(BROADCAST))
-    found = sorted({frame.source for frame in frames})
-    damage = _damage(line) - before
-    if not found and not damage:
-        found = [address for address in DEFAULT_ADDRESSES if _answers(line, address)]
-    return found, damage >= DAMAGE or len(found) > 1
-
-
 def _damage(line: Line) -> int:
     """Return how much arrived so far that makes no sense, about in bytes."""
     return line.parser.damaged_frames + line.parser.dropped_bytes
 
 
-def _answers(line: Line, address: int) -> bool:
-    try:
-        line.exchange(commands.READ_DEVICE_NAME.request(address), lambda frame: None,
-                      LAST_ANSWER_TIME, attempts=1)
-    except LinkError:
-        raise
-    except RefusedError:
-        return True
-    except DriverError:
-        return False
-    return True
+class Heard(NamedTuple):
+    """What came back to a question.
+
+    Attributes:
+        addresses: Whose answers came.
+        damage: Bytes that make no sense, about.
+        echo: Whether the question itself came back.
+    """
+
+    addresses: set[int]
+    damage: int
+    echo: bool
+
+    @property
+    def is_unclear(self) -> bool:
+        """Whether more sensors may be there than those whose answers came."""
+        return self.damage >= DAMAGE or len(self.addresses) > 1
 
 
-def _sweep(line: Line, addresses: Sequence[int], progress: Progress) -> list[int]:
+def _ask_all(line: Line) -> Heard:
+    """Ask by broadcast, and without any answer at the usual addresses; raises LinkError."""
+    for address in (BROADCAST, BROADCAST, *DEFAULT_ADDRESSES):
+        heard = _ask(line, address, LAST_ANSWER_TIME)
+        if heard.addresses or heard.damage:
+            break
+    return heard
+
+
+def _sweep(line: Line, addresses: Sequence[int], progress: Progress) -> set[int]:
     """Return those of the addresses that answer; raises LinkError."""
-    link, parser = line.link, FrameParser()
     found: set[int] = set()
     progress.expect(SWEEP_STEPS)
     share = len(addresses) / SWEEP_STEPS
-    wait = ANSWER_TIME + link.seconds(ANSWER_SIZE)
     for number, address in enumerate(addresses):
         if number % share < 1:
-            progress.step(f"{line.port}: iSYS at {link.baud_rate} Bd, address {address}")
-        link.write(commands.READ_ADDRESS.request(address).encode())
-        found |= _sources(line, parser, wait)
-    return sorted(found | _sources(line, parser, LAST_ANSWER_TIME))
+            progress.step(f"{line.port}: iSYS at {line.baud_rate} Bd, address {address}")
+        found |= _ask(line, address, ANSWER_TIME).addresses
+    return found
 
 
-def _sources(line: Line, parser: FrameParser, seconds: float) -> set[int]:
-    """Return the addresses from which answers come in so many s; the first ends the wait."""
-    end = time.monotonic() + seconds
-    while (remaining := end - time.monotonic()) > 0:
-        found = {frame.source for frame in parser.feed(line.link.read(remaining))
-                 if frame.destination == MASTER}
-        if found:
-            return found
-    return set()
+def _ask(line: Line, address: int, seconds: float) -> Heard:
+    """Ask for the address and take all that comes in so many s after the bytes' own time.
+
+    Of answers to a single address, the first is the last.
+    """
+    link, parser, request = line.link, FrameParser(), commands.READ_ADDRESS.request(address)
+    found: set[int] = set()
+    echo = False
+    late = {frame.source for frame in parser.feed(link.read(0)) if frame.destination == MASTER}
+    link.write(request.encode())
+    end = time.monotonic() + seconds + link.seconds(ANSWER_SIZE)
+    while (remaining := end - time.monotonic()) > 0 and (address == BROADCAST or not found):
+        for frame in parser.feed(link.read(remaining)):
+            if frame.destination == MASTER:
+                found.add(frame.source)
+            echo = echo or frame == request
+    list(parser.flush())
+    return Heard(found | late, parser.damaged_frames + parser.dropped_bytes, echo)

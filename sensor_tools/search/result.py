@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from driver_common.advice import Advice
+from driver_common.errors import DriverError
 from driver_common.settings import Value
 from sensor_tools.search.place import Place
 
@@ -71,9 +72,14 @@ class Finding:
         """Return a finding in the words of the table."""
         return cls(str(subject), check, *advice.filled(**facts), is_wrong)
 
+    @classmethod
+    def of_error(cls, subject: object, error: DriverError) -> Finding:
+        """Return a finding for an error of the link."""
+        cause, _, remedy = str(error).partition("; ")
+        return cls(str(subject), "link", cause, remedy)
+
 
 Result: TypeAlias = Found | Finding
-Search: TypeAlias = Callable[["Progress"], Iterator[Result]]
 
 
 class Progress:

@@ -26,9 +26,13 @@ def search(place: SerialPlace, progress: Progress) -> Iterator[Result]:
     line = Line(place.port)
     line.open()
     try:
+        results: list[Result] = []
         for address in ADDRESSES:
             progress.step(f"{place.port}: UC4000 at address {address}")
-            yield from _at(place, line, address)
+            results += _at(place, line, address)
+        if len(results) == len(ADDRESSES) and all(isinstance(one, Finding) for one in results):
+            results = [Finding.of(place, "answers", advice.GARBAGE, family=PRODUCT)]
+        yield from results
         if line.echo:
             yield Finding.of(place, "echo", advice.ECHO, is_wrong=False)
     finally:
@@ -48,8 +52,6 @@ def _at(place: SerialPlace, line: Line, address: int) -> Iterator[Result]:
         except NoAnswerError as error:
             # Damage to what the line asks first, after a silence, counts for it as no answer.
             something_came = something_came or isinstance(error.__context__, FrameError)
-            if not something_came:
-                return
         except (FrameError, RefusedError):
             something_came = True
         else:
@@ -57,4 +59,5 @@ def _at(place: SerialPlace, line: Line, address: int) -> Iterator[Result]:
                 yield Found(FAMILY, place, PRODUCT, str(address), BAUD_RATE, serial_number=number,
                             firmware=version, parameters={"address": address})
                 return
-    yield Finding.of(place, who, advice.SAME_ADDRESS, address=address)
+    if something_came:
+        yield Finding.of(place, who, advice.SAME_ADDRESS, address=address)

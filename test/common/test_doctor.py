@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import stat
@@ -11,6 +12,7 @@ import threading
 import time
 from types import SimpleNamespace
 
+import can
 import pytest
 import rclpy
 import serial
@@ -173,16 +175,33 @@ def test_an_own_echo_is_told_but_not_wrong(bench, doctor):
     assert "the line returns what is sent" in well
 
 
-@pytest.mark.parametrize(("milliseconds", "count"), [("16", 1), ("1", 0), ("?", 0)])
-def test_an_adapter_that_holds_bytes_back(bench, monkeypatch, tmp_path, milliseconds, count):
+def test_an_echo_without_an_answer_shows_how_far_the_line_is_right(bench, doctor):
+    line, (sensor,) = bench.ultrasonic_sensors(4)
+    line.faults.echo = sensor.silent = True
+    wrong, well = doctor("--port", line.port)
+    assert wrong == ["the line returns what is sent, so it is right up to there"]
+    assert well.count("the line returns what is sent") == 1
+
+
+def test_an_echo_of_a_radar_line_is_told(bench, doctor):
+    line, _ = bench.radars("iSYS-4001")
+    line.faults.echo = True
+    wrong, well = doctor("--port", line.port)
+    assert not wrong
+    assert "the line returns what is sent" in well
+
+
+@pytest.mark.parametrize(("milliseconds", "causes"), [
+    ("16", [(True, "its driver hands over what it received only every 16 ms")]), ("1", []),
+    ("?", [(False, "its driver has no mode of low latency")])])  # true of a pseudo-terminal
+def test_an_adapter_that_holds_bytes_back(bench, monkeypatch, tmp_path, milliseconds, causes):
     port, _ = bench.empty_port()
-    file = tmp_path / port.rpartition("/")[2] / "device" / "latency_timer"
-    file.parent.mkdir(parents=True)
-    file.write_text(milliseconds)
+    device = tmp_path / port.rpartition("/")[2] / "device"
+    device.mkdir(parents=True)
+    (device / "latency_timer").write_text(milliseconds)
     monkeypatch.setattr(serial_port, "TTYS", tmp_path)
-    found = list(serial_port._examine_latency(SerialPlace(port)))
-    assert len(found) == count
-    assert all(f"echo 1 > {file}" in one.remedy for one in found)
+    found = [one for one in serial_port._examine_line(SerialPlace(port)) if one.check == "latency"]
+    assert [(one.is_wrong, one.cause) for one in found] == causes
 
 
 def test_a_port_that_vanishes_meanwhile(bench, monkeypatch):
@@ -226,6 +245,14 @@ def test_a_bus_that_is_not_there(doctor):
     wrong, _ = doctor("--can", "can0", "--can-interface", "socketcand", "--can-option",
                       "host=127.0.0.1", "--can-option", "port=1")
     assert wrong == ["cannot open socketcand can0 at 127.0.0.1:1: nothing listens there"]
+
+
+def test_a_bus_that_is_down(doctor, monkeypatch):
+    def bus(**_):
+        raise OSError(errno.ENETDOWN, "Network is down")
+
+    monkeypatch.setattr(can, "Bus", bus)
+    assert doctor("--can", "can0")[0] == ["cannot open socketcan can0: it is down"]
 
 
 def test_error_frames(bench, doctor):

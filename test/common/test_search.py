@@ -168,6 +168,15 @@ def test_ultrasonic_sensors_with_the_same_address_are_noticed(bench):
     assert [finding.cause for finding in findings] == ["only damaged answers come from address 2"]
 
 
+def test_what_is_damaged_everywhere_is_no_sensor(bench):
+    line, _ = bench.ultrasonic_sensors(1)
+    line.faults.corrupt = 1.0
+    line._device.receive = lambda data, now: [(now, b"\x55\x12")]
+    found, findings = search(uc4000, SerialPlace(line.port))
+    assert not found
+    assert [one.cause for one in findings] == ["bytes arrive that are no UC4000 frames"]
+
+
 def test_ultrasonic_sensors_are_only_read(bench):
     line, _ = bench.ultrasonic_sensors(1, 5)
     search(uc4000, SerialPlace(line.port))
