@@ -16,7 +16,7 @@ from driver_common.device_bus import Listener
 needs_errors_of_socketcand = pytest.mark.skipif(
     "< error" not in inspect.getsource(socketcand),
     reason="this python-can does not hear what a socketcand server complains about")
-DEADLINE = 20.0  # s; far more than anything takes, also on a busy machine
+DEADLINE = 60.0  # s; far more than anything takes, also on a busy machine
 
 
 def wait_until(condition):

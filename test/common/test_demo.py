@@ -13,7 +13,7 @@ import pytest
 from rosbags.highlevel import AnyReader
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-DEADLINE = 60  # seconds
+DEADLINE = 200  # seconds
 TOPICS = {
     "/isys_radar/points": "sensor_msgs/msg/PointCloud2",
     "/icotronic/imu/data_raw": "sensor_msgs/msg/Imu",

