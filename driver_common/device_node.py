@@ -18,9 +18,10 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
-from driver_common import diagnostics, node_recorder
+from driver_common import diagnostics, node_recorder, program
 from driver_common.device_thread import Bus, DeviceThread
 from driver_common.errors import DriverError, SettingError
 from driver_common.node_recorder import NodeRecorder
@@ -95,6 +96,7 @@ class DeviceNode(LifecycleNode):
         self.bus: Any = None
         self.thread: DeviceThread | None = None
         self.simulator: Simulator | None = None
+        self._stopping = False
         self._bus_error: DriverError | None = None
         self._statuses: list[DiagnosticStatus] = []
         self._statuses_due = 0.0
@@ -546,6 +548,8 @@ class DeviceNode(LifecycleNode):
         self.thread = DeviceThread(f"{self.get_name()} bus", bus, self.on_bus_state,
                                    self.on_step)
         self.thread.start()
+        if self._stopping:
+            self.thread.stop()
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -595,11 +599,17 @@ class DeviceNode(LifecycleNode):
 
     def destroy_node(self) -> None:
         """Leave the devices stopped and the port closed."""
-        if self.thread is not None:
-            self.thread.stop()
-            self._recorder.finish_raw()
+        self.stop()
         self._close_simulator()
         super().destroy_node()
+
+    def stop(self) -> None:
+        """Leave the devices stopped and the port closed for good; from any thread."""
+        self._stopping = True
+        thread = self.thread
+        if thread is not None:
+            thread.stop()
+            self._recorder.finish_raw()
 
     def _close_simulator(self) -> None:
         if self.simulator is not None:
@@ -608,35 +618,43 @@ class DeviceNode(LifecycleNode):
 
 
 def run(make_node: Callable[[], DeviceNode], args: Sequence[str] | None = None) -> int:
-    """Run a driver until it is told to stop; return the exit code of the process."""
-    node = context = None
+    """Run a driver until a signal stops it; return the exit code of the process."""
+    watch = program.watch or program.SignalWatch()
+    node, code = None, 1
     try:
-        rclpy.init(args=args)
-        context = rclpy.get_default_context()
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = make_node()
+        watch.watch(node.stop, rclpy.try_shutdown)
+        code = _work(node)
+    except DriverError as error:
+        print(f"error: {error}", file=sys.stderr)
+    except _ArgumentErrors as error:
+        if node is not None:
+            raise
+        print(f"error: {str(error).splitlines()[0]}", file=sys.stderr)
+    finally:
+        if node is not None:
+            node.stop()
+            program.end_in(program.MIDDLEWARE_TIME, code)
+            node.destroy_node()
+        rclpy.try_shutdown()
+    return code
+
+
+def _work(node: DeviceNode) -> int:
+    """Serve until the context is shut down; return the exit code."""
+    context = node.context
+    try:
         executor = SingleThreadedExecutor()
         executor.add_node(node)
         if node.option("autostart"):
             if node.trigger_configure() != TransitionCallbackReturn.SUCCESS:
-                return 1
+                return int(context.ok())
             node.trigger_activate()
         executor.spin()
-    except KeyboardInterrupt:
-        pass
-    except DriverError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
-    except Exception as error:
-        if context is not None and not context.ok():
-            return 0  # a signal came, perhaps in the midst of publishing
-        if node is None and isinstance(error, _ArgumentErrors):
-            print(f"error: {str(error).splitlines()[0]}", file=sys.stderr)
-            return 1
-        raise
-    finally:
-        if node is not None:
-            node.destroy_node()
-        rclpy.try_shutdown()
+    except Exception:
+        if context.ok():  # else a signal came, perhaps in the midst of publishing
+            raise
     return 0
 
 

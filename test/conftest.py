@@ -3,6 +3,7 @@
 import atexit
 import functools
 import os
+import pathlib
 import shutil
 import tempfile
 
@@ -10,12 +11,28 @@ import pytest
 
 from sensor_tools.ros_domain import claim_domain
 
+# Fast DDS 2.14 hangs where a participant leaves in the moment in which its lease is looked at. That
+# is when the lease ends, by default every 20 s. Nodes of tests say when they leave.
+LEASE = """<?xml version="1.0" encoding="UTF-8"?>
+<profiles xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
+  <participant profile_name="test" is_default_profile="true">
+    <rtps><builtin><discovery_config>
+      <leaseDuration><sec>600</sec></leaseDuration>
+      <leaseAnnouncement><sec>3</sec></leaseAnnouncement>
+    </discovery_config></builtin></rtps>
+  </participant>
+</profiles>
+"""
+
 log_directory = tempfile.mkdtemp(prefix="ros-log-")
 atexit.register(shutil.rmtree, log_directory, ignore_errors=True)
 
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 os.environ["ROS_DOMAIN_ID"] = str(claim_domain())  # own to this process, also with pytest-xdist
 os.environ["ROS_LOG_DIR"] = log_directory
+profile = pathlib.Path(log_directory, "fastdds.xml")
+profile.write_text(LEASE)
+os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(profile)
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"  # a field of the wrong type is an error, not a crash
 
 

@@ -136,8 +136,8 @@ def _demonstrate(options: argparse.Namespace, families: Sequence[Family]) -> int
             stack.enter_context(bag)
         directory = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="demo-")))
         os.environ["ROS_LOG_DIR"] = str(directory)
-        recorder = stack.enter_context(Recorder(topics, bag))
         processes = stack.enter_context(Processes(directory))
+        recorder = stack.enter_context(Recorder(topics, bag))  # which ends before the nodes do
         _start(families, processes)
         _wait_for_first_messages(families, recorder, processes, interruption)
         _record(options.duration, recorder, interruption)

@@ -21,7 +21,9 @@ class HangingBus(DeviceBus):
         pass
 
     def poll(self):
-        self.told = self.told or sys.stdin.readline()
+        if not self.told:
+            print("hangs", flush=True)
+            self.told = sys.stdin.readline()
         return math.inf
 
 

@@ -40,6 +40,7 @@ from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
+PATIENCE = 5.0  # s for a program that is to end
 DEADLINE = 60.0  # s; far more than anything takes, also on a busy machine
 OFTEN = "import driver_common.diagnostics as d; d.PERIOD = 0.1"  # s; the tests wait for them
 # A test run that is killed must leave no node behind that holds a port (prctl(2)).
@@ -73,8 +74,12 @@ class Process:
         return self
 
     def __exit__(self, *_):
-        self._process.kill()
-        self._process.wait()
+        self._process.terminate()  # so that a node tells the others that it leaves
+        try:
+            self._process.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
         self._reader.join()
         self._process.stdout.close()
         self._process.stdin.close()
@@ -89,6 +94,11 @@ class Process:
     def log(self):
         """All that was printed until now."""
         return "\n".join(self.lines)
+
+    @property
+    def number(self):
+        """Number of the process."""
+        return self._process.pid
 
     def tell(self, line):
         """Write a line to the standard input of the program."""
@@ -167,6 +177,12 @@ class Ros:
         return self
 
     def __exit__(self, *_):
+        # Fast DDS can hang here while another participant leaves; the test is over by then.
+        leaving = threading.Thread(target=self._leave, daemon=True)
+        leaving.start()
+        leaving.join(PATIENCE)
+
+    def _leave(self):
         self._executor.shutdown()
         self.node.destroy_node()
         rclpy.try_shutdown(context=self._context)
