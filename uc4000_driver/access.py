@@ -8,7 +8,13 @@ from typing import TypeVar
 from driver_common.errors import FrameError, NoAnswerError, RefusedError
 from driver_common.settings import UNKNOWN, Raw, Record
 from uc4000_driver.commands import Command, Uc4000Record
-from uc4000_driver.line import Answer, DamagedRequestError, Line, TelegramRefusedError
+from uc4000_driver.line import (
+    Answer,
+    DamagedRequestError,
+    LateReplyError,
+    Line,
+    TelegramRefusedError,
+)
 from uc4000_driver.sensor import Sensor
 
 T = TypeVar("T")
@@ -43,7 +49,7 @@ class Access:
         except TelegramRefusedError as error:
             sensor.statistics.refusals[error.code] += 1
             raise
-        except NoAnswerError:
+        except (NoAnswerError, LateReplyError):
             sensor.statistics.timeouts += 1
             raise
         except DamagedRequestError:

@@ -31,6 +31,7 @@ from uc4000_driver.telegram import (
     ErrorCode,
     Reply,
     ReplyParser,
+    decoded,
     error_text,
 )
 
@@ -62,6 +63,14 @@ class TelegramRefusedError(RefusedError):
 
 class DamagedRequestError(FrameError):
     """A sensor answered that the request arrived damaged; the same can be asked again."""
+
+
+class LateReplyError(FrameError):
+    """What came may be the reply to an earlier request."""
+
+    def __init__(self, who: str) -> None:
+        """Put it in words."""
+        super().__init__(f"{who} answers late: what came may answer an earlier request")
 
 
 class BusyError(DriverError):
@@ -165,6 +174,7 @@ class Line:
         Raises:
             TelegramRefusedError: The sensor answered with an error code.
             DamagedRequestError: The sensor could not read the request.
+            LateReplyError: The reply may be that to an earlier request.
             FrameError: The reply was damaged.
             NoAnswerError: Nothing came in time.
             BusyError: It was asked from within a long wait.
@@ -231,10 +241,9 @@ class Line:
         else:
             try:
                 self._converse([(address, barrier)], who, LATENCY)
-            except RefusedError as error:  # that, too, may be old
+            except RefusedError:
                 self._late.add(barrier.reply_length)
-                raise NoAnswerError(f"no answer from {who} but perhaps an older one: {error}"
-                                    ) from None
+                raise LateReplyError(who) from None
         self._late.clear()
 
     def _wait_for_silence(self) -> None:
@@ -282,9 +291,11 @@ class Line:
                                    f"sent; set local_echo to {right} or auto")
         if parser.complete and not parser.pending:
             return
-        if parser.pending or parser.damaged:
-            what = (parser.pending or parser.damaged).hex(" ").upper()
-            raise FrameError(f"damaged reply from {who}: {what}")
+        data = parser.pending or parser.damaged
+        if any(decoded(data[:length]) for length in self._late):
+            raise LateReplyError(who)
+        if data:
+            raise FrameError(f"damaged reply from {who}: {data.hex(' ').upper()}")
         hint = ""
         if wanted and not parser.echo:
             hint = ", not even the echo of what was sent: is the line connected, or local_echo off?"

@@ -187,7 +187,7 @@ class ReplyParser:
         self._take_replies()
         if self._length > SHORT_REPLY and len(self._buffer) == SHORT_REPLY:
             # The beginning of a text can look like a refusal ("HW" does); no code is a letter.
-            reply = _decode(self._buffer)
+            reply = decoded(self._buffer)
             if reply and not reply.acknowledged and not 0x20 <= reply.data[0] < 0x7F:
                 self._take(reply, 0, SHORT_REPLY)
         if self._buffer:
@@ -201,7 +201,7 @@ class ReplyParser:
             if self._length > SHORT_REPLY:
                 starts = range(len(self._buffer) - self._length + 1)
             for start in starts:
-                reply = _decode(self._buffer[start:start + self._length])
+                reply = decoded(self._buffer[start:start + self._length])
                 if reply and (self._length == SHORT_REPLY or reply.acknowledged):
                     self._take(reply, start, self._length)
                     break
@@ -217,7 +217,8 @@ class ReplyParser:
         del self._buffer[:start + length]
 
 
-def _decode(telegram: bytes | bytearray) -> Reply | None:
+def decoded(telegram: bytes | bytearray) -> Reply | None:
+    """Return the reply that the bytes mean, None where they mean none."""
     try:
         return Reply.decode(bytes(telegram))
     except FrameError:
