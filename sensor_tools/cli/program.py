@@ -1,12 +1,11 @@
 """The command `sensors`: all subcommands in one place, errors in words, exit codes.
 
-0 = well, 1 = something is wrong with a sensor, a port or a value, 2 = the command line is wrong.
+0 = well, 1 = something is wrong with a sensor, a port or a value, or nobody reads on (as in
+"sensors get | head"), 2 = the command line is wrong.
 """
 
 from __future__ import annotations
 
-import contextlib
-import os
 import signal
 import sys
 from collections.abc import Callable, Sequence
@@ -80,10 +79,6 @@ def main(args: Sequence[str] | None = None, command: click.Command = sensors,
         sys.exit(1)
     except (KeyboardInterrupt, click.Abort):
         sys.exit(128 + signal.SIGINT)
-    except BrokenPipeError:  # nobody reads on, as in "sensors get | head"
-        with contextlib.suppress(OSError):
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(128 + signal.SIGPIPE)
 
 
 def doctor_main() -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import csv
 import sys
-from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TextIO
 
@@ -17,12 +17,14 @@ from sensor_tools.cli.places import Wanted, place_options
 from sensor_tools.cli.sensor import session
 from sensor_tools.measurements import Row
 
-FLUSH_PERIOD = 1.0  # s of measurements that a power failure may cost
+FLUSH_PERIOD = 0.2  # s of measurements that wait in memory
 SECOND = 1_000_000_000  # ns
 
 
 class Table:
     """Writes measurements as CSV: RFC 4180, UTF-8, a heading with units, times since the epoch.
+
+    Rows wait for `flush`: an error of the file must not be taken for one of the bus.
 
     Attributes:
         count: Measurements so far.
@@ -33,20 +35,23 @@ class Table:
         self.count = 0
         self._file = file
         self._writer = csv.writer(file)
+        self._waiting: list[tuple[str, ...]] = []
 
     def begin(self, columns: Mapping[str, str]) -> None:
         """Write the heading: names and units."""
-        self._writer.writerow(["time [s]", *(f"{name} [{unit}]" if unit else name
-                                             for name, unit in columns.items())])
+        self._waiting.append(("time [s]", *(f"{name} [{unit}]" if unit else name
+                                            for name, unit in columns.items())))
 
     def take(self, stamp: int, rows: Sequence[Row]) -> None:
-        """Write a measurement of so many ns since the epoch."""
+        """Take a measurement of so many ns since the epoch."""
         time = f"{stamp // SECOND}.{stamp % SECOND:09d}"
-        self._writer.writerows((time, *map(_text, row)) for row in rows)
+        self._waiting += [(time, *map(_text, row)) for row in rows]
         self.count += 1
 
     def flush(self) -> None:
-        """Have the system take what was written."""
+        """Write what waits; raises OSError."""
+        self._writer.writerows(self._waiting)
+        self._waiting.clear()
         self._file.flush()
 
 
@@ -67,14 +72,19 @@ def record(wanted: Wanted, file: Path, duration: float | None, overwrite: bool) 
             one.connect()
             table.begin(one.family.columns(one.device))
             measure(one, duration, table.flush, FLUSH_PERIOD)
+        table.flush()  # what came while the sensor was stopped
     click.echo(f"{table.count} measurements in {file}", err=True)
 
 
-def _opened(file: Path, overwrite: bool) -> AbstractContextManager[TextIO]:
+@contextmanager
+def _opened(file: Path, overwrite: bool) -> Iterator[TextIO]:
+    """Yield a file to write to; raises DriverError for all that goes wrong with it."""
     if str(file) == "-":
-        return nullcontext(sys.stdout)
+        yield sys.stdout
+        return
     try:
-        return file.open("w" if overwrite else "x", newline="", encoding="utf-8")
+        with file.open("w" if overwrite else "x", newline="", encoding="utf-8") as stream:
+            yield stream
     except FileExistsError:
         raise DriverError(f"{file} exists already; --overwrite replaces it") from None
     except OSError as error:

@@ -337,6 +337,39 @@ def test_watch_draws_on_a_terminal(bench):
     os.close(master)
 
 
+def test_record_ends_when_nobody_reads_on(bench):
+    _, words = bench.network()
+    with start("record", "-", *words, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+               text=True) as process:
+        assert process.stdout.readline() == "time [s],x [m/s²]\n"
+        process.stdout.close()
+        assert process.stderr.read() == ""
+    assert process.returncode == 1
+
+
+def test_record_says_that_the_disk_is_full(bench, command):
+    line, _ = bench.ultrasonic_sensors(2)
+    outcome = command("record", "/dev/full", "--overwrite", "--port", line.port, "--duration", 9)
+    assert outcome.code == 1
+    assert "error: cannot write /dev/full: No space left on device" in outcome.err
+
+
+def test_a_search_shows_how_far_it_is_and_can_be_interrupted(bench):
+    port, _ = bench.empty_port()
+    master, slave = pty.openpty()
+    with start("scan", "--port", port, stderr=slave, stdout=subprocess.PIPE) as process:
+        os.close(slave)
+        drawn = b""
+        while b"iSYS at" not in drawn:
+            drawn += os.read(master, 4096)
+        process.send_signal(signal.SIGINT)
+        assert process.stdout.read() == b""
+    os.close(master)
+    assert b"UC4000 at address 7" in drawn
+    assert b"Traceback" not in drawn
+    assert process.returncode == 128 + signal.SIGINT
+
+
 # --- which sensor, and errors ------------------------------------------------------------------
 
 @pytest.mark.parametrize(("words", "code", "reason"), [
