@@ -63,6 +63,11 @@ class Interruptible(Protocol):
     def interrupt(self) -> None:
         """Have the present step end soon with a DriverError; called from another thread."""
 
+
+@runtime_checkable
+class Patient(Protocol):
+    """A bus which lets others be heard within a long step."""
+
     def while_waiting(self, task: Callable[[], None]) -> None:
         """Have `task` done now and then within a long step; it cannot have the link."""
 
@@ -91,7 +96,7 @@ class DeviceThread(threading.Thread):
         self._jobs: queue.SimpleQueue[tuple[Callable[[], Any], Future[Any]] | None] = (
             queue.SimpleQueue())
         self._stopping = False
-        if isinstance(bus, Interruptible):
+        if isinstance(bus, Patient):
             bus.while_waiting(self._run_between)
 
     def call(self, job: Callable[[], T], timeout: float = CALL_TIMEOUT) -> T:

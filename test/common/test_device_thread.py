@@ -41,9 +41,6 @@ class FakeBus:
 class InterruptibleBus(FakeBus):
     """A bus whose present step can be ended."""
 
-    def while_waiting(self, task):
-        self.between = task
-
     def interrupt(self):
         self.steps.put(LinkError("interrupted"))
 
@@ -229,6 +226,23 @@ def test_stopping_does_not_wait_for_a_long_pause(bus, start):
     next_state(states)
     thread.stop()
     assert not thread.is_alive()
+
+
+def test_users_are_heard_within_a_long_step_where_the_bus_lets_them(start):
+    class PatientBus(FakeBus):
+        def while_waiting(self, task):
+            self.task = task
+
+        def poll(self):
+            while True:
+                try:
+                    return self.steps.get(timeout=0.01)
+                except queue.Empty:
+                    self.task()
+
+    bus = PatientBus()
+    thread, _ = start(bus)
+    assert thread.call(lambda: "heard") == "heard"  # though no step has ended
 
 
 def test_stopping_interrupts_a_step_where_the_bus_can(start):
