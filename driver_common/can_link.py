@@ -29,6 +29,7 @@ class CanLink:
 
     Attributes:
         arrived: Monotonic time in ns when `receive` returned last.
+        heard: Monotonic time in ns of the last frame, at first of the opening.
         receive_buffer: Bytes that the kernel keeps for us, 0 while that is not known.
 
     Args:
@@ -64,6 +65,7 @@ class CanLink:
                 AssertionError) as error:
             raise LinkError(f"cannot open {self}: {self._reason(error)}") from error
         self.arrived = 0
+        self.heard = time.monotonic_ns()
         self.receive_buffer = 0
         self._prepare_socket()
         self._receive = self._bus.recv
@@ -81,6 +83,7 @@ class CanLink:
         if message is None:
             self._recorder.add(now, Kind.NOTHING)
             return None
+        self.heard = now
         identifier = message.arbitration_id
         if message.is_extended_id:
             identifier |= EXTENDED

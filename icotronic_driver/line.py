@@ -24,6 +24,9 @@ T = TypeVar("T")
 
 REPLY_TIMEOUT = 0.6  # s; behind the stationary unit there is a radio
 ATTEMPTS = 10  # a radio loses frames; as many as the vendor's client makes (field note N1)
+BACKLOG_TIME = 1.0  # s for what waited while this host was busy
+NETWORK = ("socketcand",)  # interfaces to a server, which may be elsewhere
+SILENCE = 10.0  # s without a frame from there, although something was asked
 ENOUGH_BUFFER = 1024 * 1024  # bytes, in which about 0.4 s of the fastest stream fit
 ERROR_BUS_OFF = 0x40  # in the identifier of an error frame of the kernel
 FILTERS = (receiver_filter(SPU_1), (SPU_1 << 6, 0x1F << 6))  # for us; and as if from us
@@ -155,12 +158,14 @@ class Line:
         return self._attempt(request, timeout)
 
     def _attempt(self, request: Request[T], timeout: float) -> T:
+        self._open_again_if_silent()
         link = self.link
         link.send(request.frame.identifier.encode(), request.frame.data)
         end = time.monotonic() + timeout
         try:
-            # What came while this host was busy is looked at, however late that is.
-            while (message := link.receive(max(0.0, end - time.monotonic()))) is not None:
+            # What came while this host was busy is looked at, if a bus ever falls silent.
+            while (time.monotonic() < end + BACKLOG_TIME and (
+                    message := link.receive(max(0.0, end - time.monotonic()))) is not None):
                 streamed = message.arbitration_id == STREAM_ID and message.is_extended_id
                 if streamed and self.on_stream:
                     self.on_stream(message.data, message.timestamp, time.monotonic_ns())
@@ -173,6 +178,13 @@ class Line:
             raise link.lost(error) from error
         raise NoAnswerError(f"{node_name(request.frame.identifier.receiver)} does not answer "
                             f"on {self.name} ({request.name})")
+
+    def _open_again_if_silent(self) -> None:
+        """Open a bus elsewhere again that has been silent: its server may be gone unnoticed."""
+        silence = time.monotonic_ns() - self.link.heard
+        if self.interface in NETWORK and silence > SILENCE * 1e9:
+            self.close()
+            self.open()
 
     def _count(self, message: can.Message) -> None:
         """Count a frame that nobody waits for; raises LinkError where the controller gave up."""

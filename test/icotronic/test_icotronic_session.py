@@ -6,6 +6,7 @@ process: what they measured and lost and what the session made of it can be comp
 
 from __future__ import annotations
 
+import contextlib
 import math
 import socket
 import threading
@@ -30,6 +31,7 @@ from driver_common.errors import (
 from driver_common.simulator import bus as simulated_bus
 from driver_common.simulator.bus import CanFrame
 from icotronic_driver import acquisition, commands, connection, maintenance
+from icotronic_driver import line as can_line
 from icotronic_driver.access import Access
 from icotronic_driver.commands import CONFIGURATION, EEPROM, STREAMING, SYSTEM
 from icotronic_driver.eeprom import STH_EEPROM, STU_EEPROM, Status
@@ -393,6 +395,54 @@ def test_a_silent_stationary_unit_is_told_once_and_waited_for(start, listen, imp
     server.network.faults.silent = False
     host.find()
     assert len(host.heard.lost) == 1
+
+
+class Proxy:
+    """Stands between host and server; what it drops, nobody is told."""
+
+    def __init__(self, server):
+        self._server = server
+        self._socket = socket.create_server(("127.0.0.1", 0))
+        self.host, self.port = self._socket.getsockname()
+        self.connections = []
+        self.dropped = set()
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def _accept(self):
+        with contextlib.suppress(OSError):
+            while True:
+                client, _ = self._socket.accept()
+                server = socket.create_connection((self._server.host, self._server.port))
+                number = len(self.connections)
+                self.connections.append((client, server))
+                for source, sink in (client, server), (server, client):
+                    threading.Thread(target=self._pump, args=[number, source, sink],
+                                     daemon=True).start()
+
+    def _pump(self, number, source, sink):
+        with contextlib.suppress(OSError):
+            while data := source.recv(4096):
+                if number not in self.dropped:
+                    sink.sendall(data)
+            sink.shutdown(socket.SHUT_WR)
+
+    def close(self):
+        self._socket.close()
+        for client, server in self.connections:
+            client.close()
+            server.close()
+
+
+def test_a_server_that_is_gone_unnoticed_is_connected_again(start, listen, impatient, monkeypatch):
+    monkeypatch.setattr(can_line, "SILENCE", 0.5)
+    proxy = Proxy(start())
+    host = listen(proxy)
+    host.stream()
+    proxy.dropped.update(range(len(proxy.connections)))
+    host.until(lambda: len(proxy.connections) > len(proxy.dropped))
+    host.until(lambda: host.sensor.is_connected)
+    host.stream()
+    proxy.close()
 
 
 def test_a_connection_that_an_ended_host_left_is_given_up_for_the_wanted_sensor(start, listen):
