@@ -19,12 +19,16 @@ from driver_common.settings import Parameter, Setting, Value, suggestion
 
 _TYPES = {bool: RosParameter.Type.BOOL, int: RosParameter.Type.INTEGER,
           float: RosParameter.Type.DOUBLE, str: RosParameter.Type.STRING,
-          list: RosParameter.Type.STRING_ARRAY, tuple: RosParameter.Type.DOUBLE_ARRAY}
+          list: RosParameter.Type.STRING_ARRAY}
 
 
 def to_parameter(name: str, row: Parameter, value: Value) -> RosParameter:
     """Return a ROS parameter of the row's type."""
-    return RosParameter(name, _TYPES[row.kind], value)
+    return RosParameter(name, _type_of(row), value)
+
+
+def _type_of(row: Parameter) -> RosParameter.Type:
+    return RosParameter.Type.DOUBLE_ARRAY if row.is_pair else _TYPES[row.kind]
 
 
 def to_descriptor(row: Parameter, value: Value) -> ParameterDescriptor:
@@ -84,7 +88,7 @@ class ParameterStore:
                 return
             self.undeclare([name])
         # By type first: rclpy takes an empty list for one of bytes.
-        self._node.declare_parameter(name, _TYPES[row.kind], to_descriptor(row, value),
+        self._node.declare_parameter(name, _type_of(row), to_descriptor(row, value),
                                      ignore_override=True)
         self.rows[name] = row
         self.store({name: value})

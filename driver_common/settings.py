@@ -34,12 +34,13 @@ class Parameter:
 
     Attributes:
         name: Parameter name, snake_case, dots between groups.
-        kind: `bool`, `int`, `float`, `str`, `list` (a list of names) or `tuple` (two numbers).
+        kind: `bool`, `int`, `float`, `str` or `list` (a list of names).
         unit: Unit of the value, "" where it has none.
         minimum: Smallest allowed value, or None.
         maximum: Largest allowed value, or None.
         choices: Allowed words, each with its code on the wire; None for free values.
         pattern: What a free text must match, as a regular expression; "" for any text.
+        is_pair: Whether a list has two numbers instead of names.
         read_only: Whether the value can be read only.
         description: One line for people.
     """
@@ -52,6 +53,7 @@ class Parameter:
     maximum: float | None = None
     choices: Mapping[str, int] | None = None
     pattern: str = ""
+    is_pair: bool = False
     read_only: bool = False
     description: str = ""
 
@@ -72,7 +74,7 @@ class Parameter:
             value = int(value)
         if self.kind is str:
             value = self._as_text(value)
-        if self.kind is tuple:
+        if self.is_pair:
             return self._as_pair(value)
         if self.kind is list and isinstance(value, Sequence) and not isinstance(value, str):
             if all(isinstance(item, str) for item in value):
@@ -143,8 +145,10 @@ class Parameter:
     def _kind_in_words(self) -> str:
         if self.choices is not None:
             return "one of " + ", ".join(self.choices)
+        if self.is_pair:
+            return "two numbers"
         return {bool: "true or false", int: "a whole number", float: "a number", str: "a text",
-                list: "a list of words", tuple: "two numbers"}[self.kind]
+                list: "a list of words"}[self.kind]
 
 
 @dataclass(frozen=True)

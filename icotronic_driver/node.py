@@ -108,9 +108,11 @@ class IcotronicNode(DeviceNode, Listener):
                    description=f"What channel {axis} measures, which says what its voltage means: "
                                "auto = by used_sensor, device = by the device's calibration "
                                "factors, linear = by volts and values, or a sensor"),
-            Option(f"channel.{axis}.volts", kind=tuple, default=list(VOLTAGE.volts), unit="V",
-                   live=True, description=f"Two voltages of the linear law of channel {axis}"),
-            Option(f"channel.{axis}.values", kind=tuple, default=list(VOLTAGE.values), live=True,
+            Option(f"channel.{axis}.volts", kind=list, is_pair=True, unit="V",
+                   default=list(VOLTAGE.volts), live=True,
+                   description=f"Two voltages of the linear law of channel {axis}"),
+            Option(f"channel.{axis}.values", kind=list, is_pair=True,
+                   default=list(VOLTAGE.values), live=True,
                    description="What is measured at these voltages"),
             Option(f"channel.{axis}.unit", kind=str, default=VOLTAGE.unit, live=True,
                    description="Unit of these values; g and m/s² are accelerations, °C is a "

@@ -31,8 +31,7 @@ ROOT = Path(__file__).resolve().parent.parent
 SEVERAL = (" With `sensors: [front, rear]` those of the driver that belong to a sensor, and all of "
            "the device, come once per sensor, as in `front.address`.")
 WIDTH = 98  # of comments in a parameter file
-TYPES = {bool: "true or false", int: "integer", float: "float", str: "text", list: "list of words",
-         tuple: "two floats"}
+TYPES = {bool: "true or false", int: "integer", float: "float", str: "text", list: "list of words"}
 
 
 @dataclass(frozen=True)
@@ -202,8 +201,9 @@ def table(driver: Driver) -> str:
 def _option_rows(driver: Driver) -> Iterator[list[str]]:
     for option in driver.options:
         default = driver.default(option)
-        yield [f"`{option.name}`", TYPES[option.kind], option.unit, _range(option),
-               f"`{_yaml(default)}`", option.description]
+        kind = "two floats" if option.is_pair else TYPES[option.kind]
+        yield [f"`{option.name}`", kind, option.unit, _range(option), f"`{_yaml(default)}`",
+               option.description]
 
 
 def _setting_rows(driver: Driver) -> Iterator[list[str]]:

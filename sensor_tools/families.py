@@ -129,9 +129,7 @@ def _ultrasonic_identity(sensor: Ultrasonic) -> Mapping[str, object]:
 
 _STH_OPTIONS = _by_name(
     Parameter("channels", kind=str,
-              choices=dict.fromkeys(("x", "y", "z", "xy", "xz", "yz", "xyz"), 0)),
-    Parameter("calibration_source", kind=str,
-              choices=dict.fromkeys(("auto", "device", "range"), 0)))
+              choices=dict.fromkeys(("x", "y", "z", "xy", "xz", "yz", "xyz"), 0)))
 
 
 def _sth_bus(found: Found, take: Take, values: Options) -> IcotronicBus:

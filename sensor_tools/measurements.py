@@ -30,7 +30,7 @@ ULTRASONIC_COLUMNS: Mapping[str, str] = {"range": "m", "outcome": "", "temperatu
 
 def sth_columns(sensor: Sensor) -> Mapping[str, str]:
     """Return name and unit of each streamed channel of a connected sensor."""
-    return {channel.name: "m/s²" for channel in sensor.channels}
+    return {channel.name: channel.unit for channel in sensor.channels}
 
 
 def ignore(stamp: int, rows: Sequence[Row]) -> None:

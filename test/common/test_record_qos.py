@@ -28,7 +28,7 @@ def test_every_topic_of_a_node_is_there_under_its_name_and_those_of_its_sensors(
     topics = written("/cart/radars=isys_radar:front,rear", "spindle=icotronic")
     assert {"/cart/radars/front/points", "/cart/radars/rear/raw_signals", "/spindle/imu/batch",
             "/spindle/imu/data_raw", "/diagnostics"} <= topics.keys()
-    assert len(topics) == 2 * 9 + 6
+    assert len(topics) == 2 * 9 + 12
     assert topics["/spindle/imu/data_raw"] == {
         "history": "keep_last", "depth": 2000, "reliability": "reliable", "durability": "volatile"}
 

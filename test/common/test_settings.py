@@ -29,7 +29,7 @@ MODE = Parameter("mode", kind=str, choices={"fast": 0, "slow": 1})
 FLAG = Parameter("flag", kind=bool)
 NAME = Parameter("name", kind=str)
 NAMES = Parameter("names", kind=list)
-PAIR = Parameter("pair", kind=tuple)
+PAIR = Parameter("pair", kind=list, is_pair=True)
 
 
 def test_on_and_off_are_words_even_where_yaml_made_them_booleans():
