@@ -54,6 +54,7 @@ NOTHING_ANSWERS = Advice(
     "no sensor answers, at no address and no baud rate",
     "check power and wiring (RS-485: A and B swapped? Rx and Tx swapped?)")
 SILENCE = Advice("", "check power, wiring and the address")
+NO_ECHO = Advice("not even the echo of what was sent", "is the line connected, or local_echo off?")
 SILENCE_BEHIND_ECHO = Advice(
     "the line returns what is sent, so it is right up to there",
     "check the sensor's power and wiring, and the address")
@@ -69,8 +70,8 @@ SEVERAL = Advice("several sensors answer ({addresses})",
                  "say which one with the parameter address, or name all of them with the "
                  "parameter sensors")
 SAME_ADDRESS = Advice("only damaged answers come from address {address}",
-                      "several devices have this address: connect them one by one and give each "
-                      "its own; or there is interference")
+                      "several devices have address {address}: connect them one by one and give "
+                      "each its own; or there is interference")
 
 ANOTHER_RATE = Advice("a sensor answers at {rate} Bd, not at {wanted}",
                       "correct the parameter serial_baud")

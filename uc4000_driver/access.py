@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from typing import TypeVar
 
+from driver_common import advice
 from driver_common.errors import FrameError, NoAnswerError, RefusedError
 from driver_common.settings import UNKNOWN, Raw, Record
 from uc4000_driver.commands import Command, Uc4000Record
@@ -57,8 +58,8 @@ class Access:
             raise
         except FrameError as error:
             sensor.statistics.damaged += 1
-            raise FrameError(f"{error}; interference, or two sensors have address "
-                             f"{sensor.address}") from None
+            why = advice.SAME_ADDRESS.filled(address=sensor.address).remedy
+            raise FrameError(f"{error}; {why}") from None
 
     def read_record(self, record: Record) -> tuple[Raw, ...]:
         """Return what a record holds; where it cannot be read, what was acknowledged."""

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+from driver_common import advice
 from driver_common.errors import (
     DriverError,
     FrameError,
@@ -298,7 +299,7 @@ class Line:
             raise FrameError(f"damaged reply from {who}: {data.hex(' ').upper()}")
         hint = ""
         if wanted and not parser.echo:
-            hint = ", not even the echo of what was sent: is the line connected, or local_echo off?"
+            hint = f", {advice.NO_ECHO.text()}"
         raise NoAnswerError(f"no answer from {who} on {self.port}{hint}")
 
 

@@ -96,7 +96,8 @@ def _identified(place: SerialPlace, line: Line, address: int) -> Result:
     except LinkError:
         raise
     except WrongDeviceError as error:
-        return Finding(str(place), check, str(error), advice.SAME_ADDRESS.remedy)
+        return Finding(str(place), check, str(error),
+                       advice.SAME_ADDRESS.filled(address=address).remedy)
     except DriverError as error:
         if _damage(line) - damage >= DAMAGE:
             return Finding.of(place, check, advice.SAME_ADDRESS, address=address)

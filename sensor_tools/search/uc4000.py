@@ -9,13 +9,13 @@ from driver_common.errors import FrameError, NoAnswerError, RefusedError
 from sensor_tools.search.place import SerialPlace
 from sensor_tools.search.result import Finding, Found, Progress, Result
 from uc4000_driver import commands
-from uc4000_driver.line import Line
+from uc4000_driver.line import LateReplyError, Line
 from uc4000_driver.sensor import PRODUCT
 from uc4000_driver.telegram import BAUD_RATE, FIRST_ADDRESS, LAST_ADDRESS
 
 FAMILY = "uc4000"
 ADDRESSES = range(FIRST_ADDRESS, LAST_ADDRESS + 1)
-ATTEMPTS = 2
+ATTEMPTS, SILENCES = 4, 2
 
 
 def search(place: SerialPlace, progress: Progress) -> Iterator[Result]:
@@ -41,23 +41,30 @@ def search(place: SerialPlace, progress: Progress) -> Iterator[Result]:
 
 def _at(place: SerialPlace, line: Line, address: int) -> Iterator[Result]:
     """Yield the sensor at an address, or what is wrong with it; raises LinkError."""
-    who = f"address {address}"
-    something_came = False
+    who, silences = f"address {address}", 0
+    damaged = late = None
     for _ in range(ATTEMPTS):
         try:
             line.ask(address, commands.READ_ADDRESS, who)
-            something_came = True
             version = line.ask(address, commands.READ_VERSION, who).value
             number = line.ask(address, commands.READ_SERIAL_NUMBER, who).value
-        except NoAnswerError as error:
-            # Damage to what the line asks first, after a silence, counts for it as no answer.
-            something_came = something_came or isinstance(error.__context__, FrameError)
-        except (FrameError, RefusedError):
-            something_came = True
+        except NoAnswerError:
+            silences += 1
+            if silences == SILENCES:
+                break
+        except LateReplyError as error:
+            late = error
+        except (FrameError, RefusedError) as error:
+            damaged = error
         else:
             if version.startswith("HW"):
                 yield Found(FAMILY, place, PRODUCT, str(address), BAUD_RATE, serial_number=number,
                             firmware=version, parameters={"address": address})
-                return
-    if something_came:
+            else:
+                yield Finding(str(place), who, f"a device says that its version is {version!r}",
+                              "connect the right one")
+            return
+    if damaged:
         yield Finding.of(place, who, advice.SAME_ADDRESS, address=address)
+    elif late:
+        yield Finding(str(place), who, str(late), advice.POOR_LINE.remedy)

@@ -77,7 +77,7 @@ def test_radars_with_the_same_address_are_noticed(bench, models, cause):
     found, (finding,) = search(isys, SerialPlace(line.port, 115200), range(28, 36))
     assert not found
     assert finding.cause.startswith(cause)
-    assert finding.remedy.startswith("several devices have this address")
+    assert finding.remedy.startswith("several devices have address 30")
 
 
 def test_a_radar_that_measures_by_itself_measures_on(bench):

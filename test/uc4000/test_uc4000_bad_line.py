@@ -157,7 +157,7 @@ def test_two_sensors_with_one_address(connect):
     master = connect.master(line, *named(4, 5))
     error = master.lose()
     assert "damaged reply from s4 (address 4)" in str(error)
-    assert "two sensors have address 4" in str(error)
+    assert "several devices have address 4" in str(error)
     assert set(master.distances(3, "s5")) == {still(2)}
 
 
@@ -167,7 +167,7 @@ def test_two_replies_to_one_request(connect):
     master = connect.master(line, Options(address=4)).find()
     simulated.silent = False
     error = master.lose()
-    assert "two sensors have address 4" in str(error)
+    assert "several devices have address 4" in str(error)
 
 # --- damage, refusals, silence -----------------------------------------------------------------
 
