@@ -14,7 +14,7 @@ from isys_radar_driver import commands
 from isys_radar_driver.access import Access
 from isys_radar_driver.frames import READ_TARGET_LIST, Frame
 from isys_radar_driver.line import LATENCY
-from isys_radar_driver.plausibility import MEMORY_CYCLES
+from isys_radar_driver.plausibility import MEMORY_CYCLES, SHORT_MEMORY
 from isys_radar_driver.radar import Radar
 from isys_radar_driver.targets import Resolution, TargetList, decode_target_list
 
@@ -123,7 +123,7 @@ class Acquisition:
         listener.on_target_list(radar, targets, stamp)
         if options.read_range_list and model.supports(commands.READ_RANGE_LIST):
             range_list, stamp = self._access.timed(radar, commands.READ_RANGE_LIST, timeout)
-            if radar.limits.allow_range(range_list.range):
+            if radar.limits().allow_range(range_list.range):
                 listener.on_range_list(radar, range_list, targets, stamp)
             else:
                 radar.statistics.implausible_lists += 1
@@ -164,10 +164,11 @@ class Acquisition:
     def _objection(self, radar: Radar, targets: TargetList, begin: float) -> str:
         """Return why a list that began at a monotonic time in s cannot be true, or ""."""
         line = self._access.line
-        objection = radar.limits.objection(targets)
+        objection = radar.limits(own=line.in_doubt).objection(targets)
         if objection:
             line.damaged = time.monotonic()
-        jump = radar.continuity.follow(targets, begin, begin - MEMORY_CYCLES * radar.cycle_time)
+        memory = MEMORY_CYCLES if line.in_doubt else SHORT_MEMORY
+        jump = radar.continuity.follow(targets, begin, begin - memory * radar.cycle_time)
         has_news = bool(radar.arrivals) and begin < radar.arrivals[-1] + NEWS_TIME
         return objection or (jump if line.in_doubt and has_news else "")
 

@@ -86,6 +86,7 @@ class Connection:
         identity = self._search(radar)
         if identity is radar.known:
             radar.identity = identity
+            radar.measuring = None
             radar.unchecked = [*radar.settings]
             radar.misses = 1  # so that a setting is looked at before its first list
             self._acquisition.start_or_stop(radar)

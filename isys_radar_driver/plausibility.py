@@ -24,10 +24,11 @@ MARGIN = 1.25  # by which a value may exceed the largest limit that can be set (
 BELOW = 0.5  # m by which a range may fall short of 0
 ANGLE_MAX = math.pi / 2  # rad, a radar looks forward
 MEMORY = 3  # lists with which the next one is compared
-MEMORY_CYCLES = 6  # cycles after which they are too old
+MEMORY_CYCLES = 6.0  # cycles after which they are too old
+SHORT_MEMORY = 1.5  # the same where nothing is in doubt: the last list will do
 DAMAGED_TARGETS = 4  # most targets that damage hurts in a list whose checksum is good
 GATE = 5.0  # times the usual deviation, beyond which a value jumps
-QUANTILE = 90  # percent of the targets that define the usual deviation
+QUANTILE = 0.9  # of the targets define the usual deviation
 RELEASE, WIDEN = 0.9, 2.0  # change of that by a list that is in line, or is not
 WIDEST = np.array((6.0, 2.0, 1.0, math.radians(4.0)))  # deviation of what is the same target
 SAME = 2.6  # of 4, what its values may differ by in these units
@@ -54,8 +55,8 @@ class Limits:
     cycle_time: float
 
     @classmethod
-    def of(cls, model: Model, output: int, max_targets: int, cycle_time: float,
-           offset: float = 0.0) -> Limits:
+    def of(cls, model: Model, output: int, max_targets: int, cycle_time: float, *,
+           range_max: float, velocity_max: float, offset: float = 0.0) -> Limits:
         """Return the limits of a model; what it does not measure has none.
 
         Args:
@@ -63,13 +64,18 @@ class Limits:
             output: The output asked for.
             max_targets: Most targets in the present measurement mode.
             cycle_time: In s.
+            range_max: Largest range in m that is to be expected.
+            velocity_max: Largest velocity in m/s that is to be expected.
             offset: Distance in m that the radar subtracts from every range.
         """
-        velocity = MARGIN * model.velocity_max or math.inf
+        velocity = MARGIN * velocity_max if model.measures_velocity else math.inf
         angle = ANGLE_MAX if model.measures_angle else math.inf
-        return cls(output, max_targets, cycle_time=cycle_time, lowest=Target(
-            0.0, -velocity, -BELOW - offset if model.range_max else -math.inf, -angle),
-            highest=Target(model.signal_max, velocity, MARGIN * model.range_max or math.inf, angle))
+        nearest, farthest = -math.inf, math.inf
+        if model.measures_range:
+            nearest, farthest = -BELOW - offset, MARGIN * range_max
+        return cls(output, max_targets, cycle_time=cycle_time,
+                   lowest=Target(0.0, -velocity, nearest, -angle),
+                   highest=Target(model.signal_max, velocity, farthest, angle))
 
     def objection(self, targets: TargetList) -> str:
         """Return why a list cannot be true, "" where it can."""
@@ -159,8 +165,8 @@ class Continuity:
             return f"target {jumps.argmax() + 1} jumps"
         known = ~np.isnan(deviations[:, 0])
         if known.any():
-            share = QUANTILE if self._slack == 1 else 100  # a change that stays is usual now
-            usual = np.percentile(deviations[known], share, axis=0)
+            share = QUANTILE if self._slack == 1 else 1.0  # a change that stays is usual now
+            usual = np.sort(deviations[known], axis=0)[math.ceil(share * known.sum()) - 1]
             self._usual = np.clip(np.maximum(usual, self._usual * RELEASE), NARROWEST, WIDEST)
         self._slack = 1.0
         return ""

@@ -246,13 +246,25 @@ class Radar(Device):
         """Whether most of the last target lists told of an overloaded receiver."""
         return 2 * len(self.clippings) > len(self.arrivals)
 
-    @property
-    def limits(self) -> Limits:
-        """What its target lists keep to."""
-        offset = self.values.get("mounting_offset", 0.0)
-        assert isinstance(offset, float)
-        return Limits.of(self.known_model, self.options.output, self.max_targets, self.cycle_time,
-                         offset)
+    def limits(self, *, own: bool = False) -> Limits:
+        """Return what its target lists keep to.
+
+        Args:
+            own: Whether its own filters count as well. No manual promises that every firmware
+                filters its lists by them, so they are for when there is doubt in any case.
+        """
+        def value(name: str, default: float) -> float:
+            setting = self.values.get(name, default)
+            assert isinstance(setting, float)
+            return setting
+
+        model, output = self.known_model, f"output{self.options.output}"
+        return Limits.of(
+            model, self.options.output, self.max_targets, self.cycle_time,
+            range_max=value(f"{output}.range_max", model.range_max) if own else model.range_max,
+            velocity_max=(value(f"{output}.velocity_max", model.velocity_max) if own
+                          else model.velocity_max),
+            offset=value("mounting_offset", 0.0))
 
     def list_size(self, resolution: Resolution) -> int:
         """Return the bytes of the longest target list in the present measurement mode."""

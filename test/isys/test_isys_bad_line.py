@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import random
+import time
 
 import pytest
 from bus_master import wait_until
@@ -24,7 +25,7 @@ from driver_common.errors import FrameError, LinkError, NoAnswerError, RefusedEr
 from isys_radar_driver import acquisition, commands, connection
 from isys_radar_driver import line as isys_line
 from isys_radar_driver.commands import Location
-from isys_radar_driver.frames import FAILURE, MASTER, Frame, FrameParser
+from isys_radar_driver.frames import FAILURE, MASTER, READ_TARGET_LIST, Frame, FrameParser
 from isys_radar_driver.radar import Options
 from isys_radar_driver.session import RadarBus
 from isys_radar_driver.targets import Target
@@ -178,6 +179,60 @@ def test_a_radar_that_goes_silent_is_lost_and_returns(connect):
     master.lists(3)
     assert master.radar.connections == 2
     assert master.radar.error is None
+
+
+def test_a_radar_that_returns_measures_before_all_its_settings_are_looked_at(connect):
+    master, _, simulated = connect(wanted={"output1.range_max": 42.0})
+    master.measure()
+    simulated.silent = True
+    master.lose()
+    requests, reply = [], simulated.reply
+
+    def noting(request, now):
+        requests.append(request.function_code)
+        return reply(request, now)
+
+    simulated.reply = noting
+    simulated.silent = False
+    master.lists()
+    assert requests.index(READ_TARGET_LIST) < 8
+    master.until(lambda: not master.radar.unchecked)
+    assert requests.count(commands.READ_APPLICATION) > 40
+    assert not set(requests) & {commands.READ_SENSOR + 1, commands.READ_APPLICATION + 1}
+    assert master.radar.connections == 2
+    assert master.heard.warnings == []
+
+
+def test_a_setting_that_changed_during_an_outage_is_found(connect):
+    master, _, simulated = connect()
+    master.measure()
+    simulated.silent = True
+    master.lose()
+    simulated.set_value("output3.signal_min_db", 12.0)
+    simulated.silent = False
+    master.until(lambda: master.radar.values["output3.signal_min_db"] == 12.0)
+    assert "output3.signal_min_db is 12 dB, it was 0 dB" in master.heard.warnings[-1]
+    assert master.heard.values[-1]["output3.signal_min_db"] == 12.0
+
+
+def test_a_radar_that_returns_after_the_end_of_measuring_is_stopped(connect):
+    master, _, simulated = connect()
+    master.measure()
+    simulated.silent = True
+    master.lose()
+    master.bus.set_active(False)
+    simulated.silent = False
+    master.find()
+    assert not simulated.measuring
+    assert master.radar.measuring is False
+
+
+def test_in_doubt_the_radars_own_limits_count_as_well(connect):
+    master, _, simulated = connect(wanted={"output1.range_max": 40.0})
+    simulated.targets = lambda output, now: [Target(40.0, 1.0, 100.0, 0.0)]
+    assert master.measure()[0].targets  # a firmware that does not filter its lists
+    master.bus.line.damaged = time.monotonic()
+    master.until(lambda: master.radar.statistics.implausible_lists)
 
 
 def test_a_line_that_is_unplugged_is_an_error_that_says_so(connect):

@@ -375,3 +375,13 @@ def test_flush_finds_a_frame_behind_a_truncated_one_and_noise(
     found = _parse(broken[:cut % len(broken)] + noise + REPLY, parser=parser)
     assert REPLY in found + _bytes(parser.flush())
     assert parser.pending == 0
+
+
+@pytest.mark.parametrize("noise", [
+    "A2 01 80 E0 04 FF 04", "A2 01 80 DA 01 23", "68 FF FF 68", "10"])
+def test_noise_without_an_end_fills_no_memory_where_no_raw_signals_may_come(noise: str) -> None:
+    parser = FrameParser()
+    parser.raw_signals = False
+    for _ in range(2000):
+        assert not list(parser.feed(bytes.fromhex(noise)))
+        assert parser.pending <= 500
