@@ -27,16 +27,18 @@ Floats = npt.NDArray[np.float64]
 Point = tuple[float, float]
 
 POINTS = 400  # that an envelope lies below; then it forgets the older half
-LOWEST = 0.2  # share of the points that shows how sharp their lower edge is
+LOW, MIDDLE = 0.2, 0.4  # shares of the points that show how sharp their edge is; how high they lie
 BLUNT = 0.3e6  # ns of mean excess from which the edge of a stream is not sharp
 CLEARLY = 4.0  # times that the drift of all points must be better known than that of a sharp edge
-FEW = 8  # points that have no drift in the mean
+FEW, MANY = 5, 20  # points that have no drift in the mean; of which a few high ones do not count
 REFUTED = 5.0  # standard deviations from the drift that was to be expected
 CLUSTER = 1 / 8  # of a frame interval: frames that come nearer together were held up
 KNOWN = 20e-6  # least tolerance of a drift for points to come
 DRIFT_CHANGE = 0.02e-6  # of a crystal's drift in 1 s, by its temperature
 MEAN_CHANGE = 0.002  # of the mean delay in 1 s, in relation to it
 OUTLIER = 4.0  # mean delays; more is a pause
+MOST_FREE, DEEPEST = 0.5, 1.5  # largest share of free frames, and least delay in mean ones
+EVEN, UNEVEN, SURPRISES = 0.1, 3.0, 10  # mean square of the surprises, in so many blocks
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,7 @@ class Envelope:
     its offset the largest with which no point lies below it.
 
     Attributes:
-        excess: Mean height of the points above the line in ns.
+        excess: Mean height of the points above the line in ns, without regard to few high ones.
     """
 
     def __init__(self, prior: Prior) -> None:
@@ -148,11 +150,14 @@ class Envelope:
 
     def _learn_shape(self, heights: Floats) -> None:
         """Learn how high the points lie above the line; two of them are on it."""
-        count, usual = self._count, self._prior.jitter
-        lowest = int(LOWEST * count)
-        self.excess = float(heights.sum()) / count
-        scale = float(np.partition(heights, lowest)[lowest]) / LOWEST
-        self._scale = (max(scale, self.excess) * count + usual) / max(count - 1, 1)
+        count = self._count
+        low, middle = int(LOW * count), int(MIDDLE * count)
+        ordered = np.partition(heights, (low, middle))
+        self.excess = float(ordered[middle]) / -math.log(1 - MIDDLE)
+        if count < MANY:
+            self.excess = max(self.excess, float(heights.sum()) / count)
+        scale = max(float(ordered[low]) / LOW, self.excess)
+        self._scale = (scale * count + self._prior.jitter) / max(count - 1, 1)
 
     def _drift_of_edge(self, centre: float, reach: float) -> tuple[float, float]:
         """Return the drift of the likeliest line, and its certainty: 1/variance.
@@ -211,8 +216,6 @@ class Queue:
     A Kalman filter; its state is the line where it was looked at last in ns, the drift, and the
     logarithm of the mean delay in ns.
 
-    Attributes:
-        share_free: Share of the frames of the last block that were not held up.
     """
 
     def __init__(self, prior: Prior) -> None:
@@ -220,7 +223,8 @@ class Queue:
         self._state = np.array([0.0, prior.drift, 0.0])
         self._covariance = np.diag([0.0, prior.tolerance ** 2, 0.0])
         self._due = self._last = math.nan
-        self.share_free = 1.0
+        self._share_free = 1.0
+        self._surprise = 0.5
 
     def add(self, due: Floats, late: Floats) -> Line | None:
         """Take a block of frames in their order; return the line, None while there is none."""
@@ -231,7 +235,7 @@ class Queue:
         ahead = arrived[:-1] + cluster - due
         steps = np.diff(arrived) - cluster
         free = steps[steps > 0]
-        self.share_free = len(free) / len(steps)
+        self._share_free = len(free) / len(steps)
         if math.isnan(self._due):
             if not len(free):
                 return None
@@ -242,6 +246,15 @@ class Queue:
         self._learn_line(ahead - self._state[1] * (due - self._due), len(free))
         return Line(self._due, float(self._state[0]), float(self._state[1]),
                     math.sqrt(self._covariance[0, 0]), math.sqrt(self._covariance[1, 1]))
+
+    def explains(self, depth: float) -> bool:
+        """Whether frames are delayed like that, the least delay being `depth` in ns.
+
+        Many are held up, but not so many that none is nearly free; and from block to block as many
+        more or less as chance has it: polls have it more even, a busy host less.
+        """
+        return (self._share_free < MOST_FREE and depth < DEEPEST * math.exp(self._state[2])
+                and EVEN < self._surprise < UNEVEN)
 
     def _begin(self, due: float, ahead: Floats, free: Floats) -> None:
         mean, least = float(free.mean()), float(ahead.min())
@@ -271,6 +284,8 @@ class Queue:
         waits = np.maximum(ahead - self._state[0], 0.0) / mean
         chances = np.exp(-waits)
         expected = float(chances.sum())
+        surprise = (free - expected) ** 2 / max(expected, 1.0)
+        self._surprise += (surprise - self._surprise) / SURPRISES
         self._learn(np.array([expected / mean, 0.0, float(chances @ waits)]), free - expected,
                     max(expected, 1.0))
 

@@ -9,6 +9,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
+from driver_common.sample_clock import SampleClock
 from msg_conversions.header import to_header
 
 PERIOD = 1.0  # s
@@ -31,6 +32,15 @@ def add_values(status: DiagnosticStatus, values: Mapping[str, object]) -> None:
     status.values += [
         KeyValue(key=key, value=f"{value:.6g}" if isinstance(value, float) else str(value))
         for key, value in values.items()]
+
+
+def clock_values(clock: SampleClock, breaks: int) -> dict[str, object]:
+    """Return what a clock says of itself; `breaks` were those of its predecessors."""
+    return {"drift of the clock [ppm]": 1e6 * clock.drift,
+            "jitter of the arrivals [ms]": 1e-6 * clock.jitter,
+            "spread of the path delays [ms]": 1e-6 * clock.delay_spread,
+            "uncertainty of the stamps [ms]": 1e-6 * clock.uncertainty,
+            "breaks of the clock": breaks + clock.breaks}
 
 
 class Diagnostics:

@@ -33,18 +33,21 @@ JITTER = 30e3  # ns that the least delays of blocks vary by, before anything arr
 KNOWN_BLOCKS = 50  # after which the drift is known
 BLOCK = 0.1e9  # ns of arrivals that are looked at together
 FIRST_BLOCK = 0.01e9  # ns; each of the first ones is twice as long as the one before
-START, START_BLOCKS = 0.5e9, 3  # ns after which a stream has settled; blocks where it jitters less
+START, START_BLOCKS = 0.2e9, 3  # ns after which a stream has settled; blocks where it jitters less
 BACK_OFF = 20e6  # ns from the first stamp to its arrival: nobody knows how late that is
 QUEUE_EXCESS = 0.3e6  # ns of mean excess of the envelope from which frames may queue …
-QUEUE_FRAMES, QUEUE_FREE = 20, 0.5  # … in blocks of so many, in which the half is held up
+QUEUE_FRAMES = 20  # … in blocks of so many
 SLEW = 0.009  # largest correction of the pace
 CATCH_UP = 0.2e9  # ns in which the stamps meet the estimate, where that is slow enough
 MARGIN, MARGIN_MAX = 2e3, 150e3  # ns that stamps keep before an envelope, beside …
 UNCERTAINTIES = 4.0  # … so much of its uncertainty, for the earlier frames that will come
 QUEUE_MARGIN = 30e3  # ns before a queue's line: hardly any frame comes that near
-LATE, EARLY, START_EARLY = 2e6, 0.5e6, 20e6  # ns from which frames are not of the line, at least
+LATE, EARLY = 2e6, 0.5e6  # ns from which frames are not of the line, at least
+START_EARLY, START_POINTS = 1e9, 10  # the same until the envelope has so many points
 EXCESSES, JITTERS = 8.0, 2.0  # the same in mean excesses of the envelope, and in usual jitters
 STEADY, STEADY_BLOCKS = 0.4e9, 4  # ns and blocks of a lateness after which the sensor had paused
+SET = 1_000_000  # ns by which the time of day changes only where somebody sets it
+PROMPT, WAITED_MOST = 5_000_000, 60_000_000_000  # ns that what is on a bus waits: usually, at most
 RESTART = 1e9  # ns by which numbers go back only where a stream begins anew
 SET_BACK = 50e6  # ns by which arrivals go back only where somebody sets the clock
 PIECES = 16  # of the stamps' line that are remembered
@@ -58,16 +61,47 @@ class HostClock:
 
     Attributes:
         offset: What to add to monotonic ns, for ns since the epoch.
+        rest: What is still to be added to the offset: the clock is being corrected.
+        steps: How often the clock was set.
     """
 
     def __init__(self) -> None:
         """Read both clocks."""
-        self.follow()
+        self.offset = self._read()
+        self.rest = 0
+        self.steps = 0
 
     def follow(self) -> None:
         """Read both clocks, because somebody may have set or corrected the time of day."""
+        self.rest = self._read() - self.offset
+        if abs(self.rest) > SET:
+            self.steps += 1
+            self.offset += self.rest
+            self.rest = 0
+
+    def slew(self, most: int) -> None:
+        """Correct the offset by at most so many ns."""
+        change = min(max(self.rest, -most), most)
+        self.offset += change
+        self.rest -= change
+
+    def when(self, bus_time: float, seen: int) -> int:
+        """Return when something was on a bus, in monotonic ns.
+
+        Args:
+            bus_time: The time of day then, in s since the epoch, by the kernel of this host.
+            seen: When this process saw it, in monotonic ns.
+        """
+        on_bus = int(bus_time * 1e9) - self.offset
+        if not 0 <= seen - on_bus < PROMPT:
+            self.follow()
+            on_bus = int(bus_time * 1e9) - self.offset
+        return on_bus if 0 <= seen - on_bus < WAITED_MOST else seen
+
+    @staticmethod
+    def _read() -> int:
         # The largest of some differences: whatever comes between two readings makes them smaller.
-        self.offset = max(time.time_ns() - time.monotonic_ns() for _ in range(3))
+        return max(time.time_ns() - time.monotonic_ns() for _ in range(3))
 
 
 class Stamps:
@@ -208,6 +242,11 @@ class SampleClock:
         """Difference between the largest and the least delay of late in ns."""
         return max(self._largest_delays, default=0.0)
 
+    def settle(self) -> None:
+        """Take the estimate as it is, because no more will come."""
+        if not self.settled:
+            self._settle()
+
     def _look(self, number: int, arrival: int) -> None:
         """Learn from a block that ended, or from a frame that comes before its stamp."""
         if self._started and number < self._newest - RESTART / self.nominal_period:
@@ -243,7 +282,8 @@ class SampleClock:
     @property
     def _early_limit(self) -> float:
         """How much too early in ns a frame of the stream can be."""
-        return max(EARLY if self.settled else START_EARLY, JITTERS * self._prior.jitter,
+        begins = len(self._envelope) < START_POINTS
+        return max(START_EARLY if begins else EARLY, JITTERS * self._prior.jitter,
                    EXCESSES * self._envelope.excess)
 
     @property
@@ -332,9 +372,10 @@ class SampleClock:
         if self._queue is not None:
             line = replace(line, uncertainty=max(line.uncertainty, excess / 3))
             queue_line = self._queue.add(due, late)
-            self._queues = queue_line is not None and self._queue.share_free < QUEUE_FREE
-            if queue_line is not None and self._queues:
-                line = self._envelope.lowered(queue_line)
+            if queue_line is not None:
+                depth = line.late - queue_line.at(line.due)
+                self._queues = self._queue.explains(depth)
+                line = self._envelope.lowered(queue_line) if self._queues else line
         self._line = line
 
     # --- the stamps ---

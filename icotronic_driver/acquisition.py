@@ -15,7 +15,8 @@ from icotronic_driver import commands
 from icotronic_driver.access import READINGS, Access, Survey
 from icotronic_driver.identifier import STH_1
 from icotronic_driver.laws import DEVICE
-from icotronic_driver.line import Line, StreamHandler
+from icotronic_driver.line import Line
+from icotronic_driver.reception import Reception
 from icotronic_driver.sensor import Phase, Sensor
 from icotronic_driver.settings import SETTINGS, nearest_adc_configuration
 from icotronic_driver.streaming import StreamDecoder
@@ -54,7 +55,9 @@ class Acquisition:
         self._listener = listener
         self._wanted = wanted
         self._last_frame = 0.0
+        self._told_loss = False
         self._host_clock = HostClock()
+        self._reception: Reception | None = None
         self._told_rate = ""
         self._told_pace = False
         self._pace_since = 0.0, 0  # time in s and number of a frame
@@ -200,9 +203,12 @@ class Acquisition:
         sensor = self._sensor
         form = sensor.format
         sensor.decoder = StreamDecoder(form, form.frame_rate(sensor.adc.sample_rate))
-        sensor.clock = SampleClock(sensor.sample_rate)
-        self._line.on_stream = self._stream_handler(sensor)
-        self._last_frame = time.monotonic()
+        sensor.clock = SampleClock(sensor.sample_rate, waits=True)
+        self._reception = Reception(
+            sensor.decoder, sensor.clock, self._host_clock, self._listener.on_stream(sensor),
+            kernel_stamps=self._line.interface == "socketcan")
+        self._line.on_stream = self._reception.handler()
+        self._last_frame, self._told_loss = time.monotonic(), False
         self._pace_since, self._told_pace = (self._last_frame, 0), False
         try:
             self._line.request(commands.START_ACCELERATION.request(STH_1, form),
@@ -210,30 +216,6 @@ class Acquisition:
         except DriverError:
             self._end_stream()
             raise
-
-    def _stream_handler(self, sensor: Sensor) -> StreamHandler:
-        """Return what is done with each frame of the stream: the hot path."""
-        decoder, clock, host_clock = sensor.decoder, sensor.clock, self._host_clock
-        assert decoder is not None
-        decode, data_sets, update = decoder.decode_frame, decoder.format.data_sets, clock.update
-        publish = self._listener.on_stream(sensor)
-        lost = 0
-
-        def handle(data: bytearray, bus_time: float, now: int) -> None:
-            nonlocal lost
-            values = decode(bus_time, data, now)  # frames that waited for us were not late
-            if values is None:
-                return
-            number = decoder.number * data_sets
-            update(number + data_sets - 1, now)
-            publish(clock.time_of(number) + host_clock.offset, clock.period, values)
-            if decoder.statistics.lost != lost:
-                if not lost:
-                    self._note(f"{decoder.statistics.lost} frames were lost on the radio; more "
-                               "are counted in the diagnostics only", warning=True)
-                lost = decoder.statistics.lost
-
-        return handle
 
     def _receive(self, decoder: StreamDecoder) -> None:
         """Receive for a moment; look after a stream that fell silent."""
@@ -243,11 +225,18 @@ class Acquisition:
         self._sensor.pauses.begin()
         self._line.listen(LISTEN_TIME, self._sensor.options.may_wait)
         self._sensor.pauses.end(LISTEN_TIME, decoder.statistics.lost - lost)
+        if decoder.statistics.lost and not self._told_loss:
+            self._told_loss = True
+            self._note(f"{decoder.statistics.lost} frames were lost on the radio; more are "
+                       "counted in the diagnostics only", warning=True)
+        now = time.monotonic()
         if decoder.statistics.frames != frames:
-            self._last_frame = time.monotonic()
+            self._last_frame = now
             self._check_pace(decoder)
-        elif time.monotonic() - self._last_frame > self._longest_silence:
+        elif now - self._last_frame > self._longest_silence:
             self._look_after_stream()
+        elif now - self._last_frame > max(LISTEN_TIME, self._usual_silence) and self._reception:
+            self._reception.finish()  # what is held waits for frames that may never come
 
     def _check_pace(self, decoder: StreamDecoder) -> None:
         """Read the ADC settings again where frames come at another pace than these say."""
@@ -278,7 +267,12 @@ class Acquisition:
     @property
     def _longest_silence(self) -> float:
         """Time in s without a frame after which something is wrong with the stream."""
-        return max(SILENCE, 3 / self._sensor.format.frame_rate(self._sensor.adc.sample_rate))
+        return max(SILENCE, self._usual_silence)
+
+    @property
+    def _usual_silence(self) -> float:
+        """Time in s of three frames."""
+        return 3 / self._sensor.format.frame_rate(self._sensor.adc.sample_rate)
 
     def _look_after_stream(self) -> None:
         """React to a stream that fell silent: start it again where the sensor is still there."""
@@ -290,6 +284,9 @@ class Acquisition:
 
     def _end_stream(self) -> None:
         self._line.on_stream = None
+        if self._reception is not None:
+            self._reception.finish()
+            self._reception = None
         self._sensor.end_stream()
 
     def _take_what_is_on_the_way(self) -> None:

@@ -15,7 +15,6 @@ import numpy.typing as npt
 
 from icotronic_driver.laws import ADC_MAX
 
-CLOCK_WAS_SET = 500_000_000  # ns by which stamps go back only if the host's clock does
 LATE = 500_000_000  # ns after the end of a period in which its samples can still be on the way
 
 Table = npt.NDArray[np.float32]
@@ -175,31 +174,24 @@ class Consumer(NamedTuple):
 class Stream:
     """Hands the frames of a stream to those who listen: the hot path."""
 
-    def __init__(self, consumers: Iterable[Consumer], channels: int, offset: int) -> None:
-        """Begin a stream of so many channels, to which all listen until the first look.
+    def __init__(self, consumers: Iterable[Consumer], offset: int) -> None:
+        """Begin a stream, to which all listen until the first look.
 
         Args:
             consumers: Who may listen.
-            channels: Values of a sample.
             offset: Added to all stamps, in ns.
         """
         self._consumers = tuple(consumers)
-        self._channels = channels
         self._offset = offset
-        self._last = 0
         self._listening = self._consumers
         self._takes = tuple(consumer.take for consumer in self._listening)
 
     def take(self, stamp: int, period: float, values: tuple[int, ...]) -> None:
         """Take a frame: time of its first sample and from one to the next in ns, raw values."""
         stamp += self._offset
-        if self._last - CLOCK_WAS_SET <= stamp <= self._last:
-            # A better estimate of the sensor's clock may lie before what was published.
-            stamp = self._last + 1
         step = int(period)
         for take in self._takes:
             take(stamp, step, values)
-        self._last = stamp + step * (len(values) // self._channels - 1)
 
     def look(self, now: int) -> bool:
         """Look who listens, at `now` in ns, and return whether anybody wants each frame at once."""

@@ -150,7 +150,7 @@ class IcotronicNode(DeviceNode, Listener):
         """Declare the parameters; raises SettingError."""
         self._stream_options: list[Any] = []
         self._topics: dict[str, Any] = {}
-        self._stream = Stream((), 1, 0)
+        self._stream = Stream((), 0)
         self._told_queues: set[str] = set()
         self._told_load = ""
         self._history: deque[_Counts] = deque()
@@ -175,7 +175,7 @@ class IcotronicNode(DeviceNode, Listener):
             wanted=self.wanted_settings(""), config_mode=self.option("config_mode"))
         self._set_live(sensor)
         self._stream_options = self._read_stream_options()
-        self._stream = Stream((), 1, 0)
+        self._stream = Stream((), 0)
         return IcotronicBus(Line(interface, channel, self.option("can_bitrate"), options),
                             sensor, self)
 
@@ -274,7 +274,7 @@ class IcotronicNode(DeviceNode, Listener):
         conversion = Conversion([partial(_linear, channel) for channel in sensor.channels], axes)
         self._stream.finish()
         self._stream = Stream((*self._consumers(sensor, conversion), *self._others(sensor)),
-                              len(axes), round(self.option("time_offset") * 1e9))
+                              round(self.option("time_offset") * 1e9))
         return self.while_running(self._stream.take)
 
     def _others(self, sensor: Sensor) -> Iterator[Consumer]:
@@ -440,6 +440,8 @@ class IcotronicNode(DeviceNode, Listener):
             "connections": sensor.connections, "time-outs": sensor.time_outs,
             "unsaved settings": ", ".join(sorted(sensor.unsaved & STORED.keys()))}
         values |= sensor.differences
+        if sensor.decoder is not None:
+            values |= diagnostics.clock_values(sensor.clock, sensor.breaks)
         identity = sensor.identity
         return diagnostics.to_status(self.status_name(sensor.options.name),
                                      f"{identity.name} {identity.mac}" if identity else "",

@@ -183,6 +183,7 @@ class Sensor(Device):
         clock: Gives the samples of the stream their times.
         totals: Statistics of the streams before the present one.
         pauses: Pauses of this host while there was a stream.
+        breaks: Breaks of their clocks.
         time_outs: How often it or the stationary unit did not answer.
     """
 
@@ -205,6 +206,7 @@ class Sensor(Device):
         self.clock = SampleClock(1.0)
         self.totals = StreamStatistics()
         self.pauses = HostPauses()
+        self.breaks = 0
         self.time_outs = 0
 
     def __str__(self) -> str:
@@ -272,7 +274,7 @@ class Sensor(Device):
     @property
     def measured_rate(self) -> float:
         """Samples/s of each channel on the host's clock, 0 while there is no stream."""
-        return 1e9 / self.clock.period if self.decoder is not None else 0.0
+        return self.sample_rate / (1 + self.clock.drift) if self.decoder is not None else 0.0
 
     def bus_load(self, bitrate: float, *, stuffing: bool = True) -> float:
         """Return the share of the bus that the stream takes (section 9.2.10)."""
@@ -304,6 +306,8 @@ class Sensor(Device):
     def end_stream(self) -> None:
         """Keep the statistics of the stream that ended, if there was one."""
         self.totals = self.statistics
+        if self.decoder is not None:
+            self.breaks += self.clock.breaks
         self.decoder = None
 
     def choose_laws(self) -> None:

@@ -221,6 +221,7 @@ class StreamDecoder:
         format: Format of the stream.
         statistics: What was counted.
         number: Number of the frame that was decoded last, -1 before the first.
+        last: Its payload.
     """
 
     def __init__(self, format: StreamFormat, frame_rate: float = 0.0) -> None:
@@ -239,7 +240,7 @@ class StreamDecoder:
         self._counter = 0
         self._arrival = 0.0
         self._seen: int | None = None
-        self._last: bytes | bytearray = b""
+        self.last: bytes | bytearray = b""
         self._doubt: _Doubt | None = None
         self._usual_gap = min(_MAX_DELAY, HALF_TURN / frame_rate) if frame_rate else math.inf
         padding = self._length - _HEAD - format.values_per_frame * format.value_size
@@ -247,6 +248,10 @@ class StreamDecoder:
         self._unpack = struct.Struct(
             f"<{_HEAD}x{('HB' if wide else 'H') * format.values_per_frame}{padding}x").unpack
         self._wide = wide
+
+    def fits(self, data: bytes | bytearray) -> bool:
+        """Whether a payload is one of this stream, by format and length."""
+        return len(data) == self._length and data[0] == self._code
 
     def decode_frame(self, arrival: float, data: bytes | bytearray,
                      seen: int | None = None) -> tuple[int, ...] | None:
@@ -275,7 +280,7 @@ class StreamDecoder:
         self._counter = counter
         self._arrival = arrival
         self._seen = seen
-        self._last = data
+        self.last = data
         self.number += step
         self.statistics.frames += 1
         values = self._unpack(data)
@@ -303,7 +308,7 @@ class StreamDecoder:
             return None
         numbers = np.arange(self.number + 1, self.number + 1 + count)
         self._counter = int(counters[-1])
-        self._arrival, self._last = frames[-1]
+        self._arrival, self.last = frames[-1]
         self.number += count
         self.statistics.frames += count
         return StreamBatch(numbers, arrivals, self._values(table))
@@ -341,7 +346,7 @@ class StreamDecoder:
             waited = (seen - self._seen) * 1e-9
             if silence > waited + _MAX_BACKLOG:  # the clock was set
                 silence = waited
-        if step == 0 and data != self._last and self._frame_rate:
+        if step == 0 and data != self.last and self._frame_rate:
             step = COUNTER_TURN  # it is none that came again
         turns = max(0, round((silence * self._frame_rate - step) / COUNTER_TURN))
         if silence > _MAX_DELAY:

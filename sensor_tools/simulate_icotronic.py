@@ -23,6 +23,8 @@ FAULTS = {
     "loss": "probability that a radio frame with measured values is lost",
     "loss_run": "how many are lost in a row",
     "duplicate": "probability that such a frame comes twice",
+    "swap": "probability that such a frame comes after the one behind it",
+    "damage": "probability that its counter is damaged",
     "jitter": "time in s by which such a frame comes late, at most",
     "burst": "time in s for which such frames are held back, to come all at once",
     "answer_loss": "probability that an answer of a sensor is lost",

@@ -51,6 +51,7 @@ class SimulatedNetwork:
         faults: How the system misbehaves.
         streamed: Data frames that were sent, duplicates among them.
         lost: Data frames that were lost on the radio.
+        damaged: Data frames whose counter was damaged.
         lock: To be held while several things are changed together.
     """
 
@@ -61,12 +62,14 @@ class SimulatedNetwork:
         self.stu = SimulatedStu(self.sensors, self.faults)
         self.streamed = 0
         self.lost = 0
+        self.damaged = 0
         self.lock = threading.RLock()
         self._answers: list[tuple[float, int, CanFrame]] = []
         self._order = itertools.count()
         self._on_air: deque[tuple[float, CanFrame]] = deque()
         self._last_arrival = 0.0
         self._losing = 0
+        self._overtaken: CanFrame | None = None
         self._foreign = itertools.cycle(_FOREIGN)
         self._next_foreign = 0.0
 
@@ -196,7 +199,8 @@ class SimulatedNetwork:
             self.lost += len(frames)
             return
         self.stu.radio_received += len(frames)
-        if self.faults.spare_stream and not self._losing and not self._on_air:
+        if (self.faults.spare_stream and not self._losing and not self._on_air
+                and self._overtaken is None):
             self._on_air.extend((due, CanFrame(can_id, data)) for due, can_id, data in frames)
             return
         for due, can_id, data in frames:
@@ -214,8 +218,23 @@ class SimulatedNetwork:
         if faults.burst:
             due = math.ceil(due / faults.burst) * faults.burst
         self._last_arrival = max(due, self._last_arrival)  # the radio keeps the order
+        if faults.random.random() < faults.damage:
+            frame = _with_damaged_counter(frame, faults.random.randrange(1, 256))
+            self.damaged += 1
+        if self._overtaken is None and faults.random.random() < faults.swap:
+            self._overtaken = frame
+            return
         for _ in range(1 + (faults.random.random() < faults.duplicate)):
             self._on_air.append((self._last_arrival, frame))
+        if self._overtaken is not None:
+            self._on_air.append((self._last_arrival, self._overtaken))
+            self._overtaken = None
+
+
+def _with_damaged_counter(frame: CanFrame, by: int) -> CanFrame:
+    data = bytearray(frame.data)
+    data[1] ^= by
+    return CanFrame(frame.can_id, bytes(data))
 
 
 class SimulatedIcotronic(SimulatedBus):

@@ -27,6 +27,8 @@ class Faults:
         loss: Probability that a radio frame with measured values is lost.
         loss_run: How many are lost in a row.
         duplicate: Probability that such a frame comes twice.
+        swap: Probability that such a frame comes after the one behind it.
+        damage: Probability that its counter is damaged.
         jitter: Time in s by which such a frame comes late, at most.
         burst: Time in s for which such frames are held back, to come all at once.
         answer_loss: Probability that an answer of a sensor is lost.
@@ -42,6 +44,8 @@ class Faults:
     loss: float = 0.0
     loss_run: int = 1
     duplicate: float = 0.0
+    swap: float = 0.0
+    damage: float = 0.0
     jitter: float = 0.0
     burst: float = 0.0
     answer_loss: float = 0.0
@@ -56,7 +60,8 @@ class Faults:
     @property
     def spare_stream(self) -> bool:
         """Whether frames with measured values get through as they are."""
-        return not (self.loss or self.duplicate or self.jitter or self.burst)
+        return not (self.loss or self.duplicate or self.swap or self.damage or self.jitter
+                    or self.burst)
 
 
 class SimulatedStu(SimulatedNode):

@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from icotronic_driver.gathering import (
-    CLOCK_WAS_SET,
     LATE,
     Consumer,
     Conversion,
@@ -115,7 +114,7 @@ def batch():
 
 
 def test_who_does_not_listen_gets_nothing(single, batch):
-    stream = Stream([single.consumer, batch.consumer], 2, 0)
+    stream = Stream([single.consumer, batch.consumer], 0)
     single.listens = False
     assert not stream.look(START)
     stream.take(START, 100.9, (1, 2))
@@ -125,12 +124,12 @@ def test_who_does_not_listen_gets_nothing(single, batch):
 
 
 def test_only_who_wants_each_sample_at_once_keeps_frames_from_waiting(single, batch):
-    assert not Stream([batch.consumer], 2, 0).look(START)
-    assert Stream([single.consumer, batch.consumer], 2, 0).look(START)
+    assert not Stream([batch.consumer], 0).look(START)
+    assert Stream([single.consumer, batch.consumer], 0).look(START)
 
 
 def test_what_waits_is_handed_over_when_nothing_follows(batch):
-    stream = Stream([batch.consumer], 2, 0)
+    stream = Stream([batch.consumer], 0)
     stream.look(START)
     stream.take(START, 100.0, (1, 2))
     stream.look(START + PERIOD + LATE)
@@ -141,14 +140,3 @@ def test_what_waits_is_handed_over_when_nothing_follows(batch):
     stream.take(START, 100.0, (1, 2))
     stream.look(START)
     assert len(batch.periods) == 2
-
-
-@pytest.mark.parametrize(("second", "taken"), [
-    (3_100, 3_100), (2_050, 2_101), (1_500, 2_101),
-    (1_999 - CLOCK_WAS_SET, 1_999 - CLOCK_WAS_SET)])
-def test_stamps_go_back_only_if_the_clock_was_set(single, second, taken):
-    stream = Stream([single.consumer], 1, 7)
-    stream.look(0)
-    stream.take(1_993, 100.0, (1, 2))
-    stream.take(second - 7, 100.0, (3, 4))
-    assert [stamp for stamp, _, _ in single.frames] == [2_000, taken]

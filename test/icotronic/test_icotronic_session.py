@@ -6,6 +6,7 @@ process: what they measured and lost and what the session made of it can be comp
 
 from __future__ import annotations
 
+import collections
 import contextlib
 import math
 import socket
@@ -55,14 +56,21 @@ class Stream:
     """One stream as a user of the session got it."""
 
     def __init__(self, sensor):
-        self._decoder = sensor.decoder
         self.channels = sensor.options.channels
         self.data_sets = sensor.format.data_sets
         self.frames = []  # number of the first sample, stamp, period, values
+        self._numbers = collections.deque()
+        self._decoder, self._decode = sensor.decoder, sensor.decoder.decode_frame
+        self._decoder.decode_frame = self._note_number
+
+    def _note_number(self, *frame):
+        values = self._decode(*frame)
+        if values is not None:
+            self._numbers.append(self._decoder.number * self.data_sets)
+        return values
 
     def take(self, stamp, period, values):
-        number = self._decoder.number * self.data_sets
-        self.frames.append((number, stamp, period, values))
+        self.frames.append((self._numbers.popleft(), stamp, period, values))
 
     def samples(self):
         """Return number, stamp in s and raw values of each sample."""
@@ -114,9 +122,14 @@ class Host(BusMaster):
 
     def more(self, frames=30):
         """Poll until the present stream brought that many more frames."""
-        end = self.sensor.statistics.frames + frames
-        self.until(lambda: self.sensor.statistics.frames >= end)
+        end = self.taken + frames
+        self.until(lambda: self.taken >= end)
         return self.heard.streams[-1]
+
+    @property
+    def taken(self):
+        """Frames of all streams that came so far."""
+        return sum(len(stream.frames) for stream in self.heard.streams)
 
 
 def make_bus(server, listener, *, channel="can0", **options):
@@ -824,6 +837,30 @@ def test_what_a_bad_radio_loses_is_counted_and_what_arrives_is_true(connect, fau
     assert counts.frames == len(stream.frames)
     assert (counts.duplicates > 0) == ("duplicate" in faults)
     assert (counts.lost > 0) == ("loss" in faults)
+
+
+@pytest.mark.parametrize("faults", [{"swap": 0.02}, {"damage": 0.02},
+                                    {"swap": 0.02, "damage": 0.02, "duplicate": 0.02}])
+def test_frames_that_come_twice_in_the_wrong_order_or_damaged_have_rising_stamps(connect, faults):
+    host, network, simulated = connect()
+    host.stream(200)
+    for name, value in faults.items():
+        setattr(network.faults, name, value)
+    stream = host.more(2000)
+    for name in faults:
+        setattr(network.faults, name, 0.0)
+    host.more(200)
+    numbers, stamps, _ = stream.samples()
+    assert np.diff(stamps).min() > 0
+    assert np.diff(numbers).min() > 0
+    if len(faults) == 1:
+        assert_true(simulated, stream)
+    host.bus.set_active(False)
+    counts = host.sensor.statistics
+    assert counts.frames + counts.duplicates + counts.damaged == network.streamed
+    assert counts.damaged <= network.damaged + network.streamed * 0.01
+    if "damage" not in faults:
+        assert (counts.lost, counts.damaged) == (0, 0)
 
 
 def test_the_times_behind_a_gap_are_true(connect):

@@ -1,0 +1,104 @@
+"""Data frames in the order of their counters: none twice, none where it cannot belong.
+
+A frame whose counter does not follow the last one is held until the next ones tell what it is: one
+behind a gap, one that overtook another, or one with a damaged counter.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from icotronic_driver.streaming import COUNTER_TURN, StreamDecoder
+
+NONE = -1  # no counter
+MOST_HELD = 5  # frames; more that do not follow each other are not worth to wait for
+
+
+class Frame(NamedTuple):
+    """A frame: payload, when it was on the bus in s, and when it came to us in monotonic ns."""
+
+    data: bytes | bytearray
+    bus_time: float
+    seen: int
+
+
+class FrameOrder:
+    """Puts the frames of a stream in order.
+
+    Attributes:
+        expected: Counter of a frame that needs no `sort`: who has such a one only counts on.
+    """
+
+    def __init__(self, decoder: StreamDecoder) -> None:
+        """Begin a stream; the decoder's statistics say what was dropped."""
+        self.expected = NONE
+        self._decoder = decoder
+        self._last = NONE
+        self._held: list[Frame] = []
+
+    def sort(self, frame: Frame) -> list[Frame]:
+        """Take a frame; return those that come next, which are to be decoded before another."""
+        data, held = frame.data, self._held
+        if not self._decoder.fits(data):
+            return [frame]  # it has no counter
+        if not held:
+            if self.expected == NONE:
+                return self._go_on([frame])
+            self._last = (self.expected - 1) % COUNTER_TURN
+            if data[1] == self.expected or data == self._decoder.last:
+                return self._go_on([frame])
+            self.expected = NONE
+        elif data == held[-1].data:
+            self._decoder.statistics.duplicates += 1
+            return []
+        else:
+            following = self._find_place(frame)
+            if following:
+                return self._go_on(following)
+        held.append(frame)
+        return self._go_on(self._rising(held)) if len(held) == MOST_HELD else []
+
+    def rest(self) -> list[Frame]:
+        """Return what is held, because nothing more may come."""
+        return self._go_on(self._rising(self._held)) if self._held else []
+
+    def _find_place(self, frame: Frame) -> list[Frame]:
+        """Return what follows up to a frame that has its place, [] where it is not clear."""
+        held, step = self._held, self._step(frame)
+        if step == (self._step(held[-1]) + 1) % COUNTER_TURN:  # both are behind a gap
+            return [*self._rising(held[:-1], self._step(held[-1])), held[-1], frame]
+        if step == 1:  # it was overtaken
+            by_step = {self._step(one): one for one in held}
+            following = [frame]
+            while len(following) + 1 in by_step:
+                following.append(by_step[len(following) + 1]._replace(
+                    bus_time=frame.bus_time, seen=frame.seen))
+            return following
+        if step == len(held) + 1:  # none is missing: what is not in its place is damaged
+            return [*(one for place, one in enumerate(held, 1) if self._step(one) == place), frame]
+        return []
+
+    def _step(self, frame: Frame) -> int:
+        return (frame.data[1] - self._last) % COUNTER_TURN
+
+    def _rising(self, frames: list[Frame], end: int = COUNTER_TURN) -> list[Frame]:
+        """Return those frames whose counters rise, up to one at `end`."""
+        rising, step = [], 0
+        for frame in frames:
+            if step < self._step(frame) < end:
+                rising.append(frame)
+                step = self._step(frame)
+        return rising
+
+    def _go_on(self, frames: list[Frame]) -> list[Frame]:
+        """Return frames, from the last of which it goes on, and drop what else is held."""
+        statistics = self._decoder.statistics
+        for frame in self._held:
+            if not any(frame.data == one.data for one in frames):
+                statistics.damaged += 1
+                statistics.fault = f"data frame with counter {frame.data[1]} behind {self._last}"
+        self._held = []
+        if frames:
+            self._last = frames[-1].data[1]
+        self.expected = (self._last + 1) % COUNTER_TURN
+        return frames

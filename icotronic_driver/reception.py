@@ -1,0 +1,90 @@
+"""From the frames of a stream to samples with their times: the hot path."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+
+from driver_common.sample_clock import HostClock, SampleClock
+from icotronic_driver.line import StreamHandler
+from icotronic_driver.ordering import Frame, FrameOrder
+from icotronic_driver.streaming import COUNTER_TURN, StreamDecoder
+
+CORRECTION = 1 / 256  # of the time between two samples, by which the host's clock may correct it
+
+AT_ONCE = 4  # frames that are handed over when one comes, while some are held
+
+Publish = Callable[[int, float, tuple[int, ...]], None]
+
+
+class Reception:
+    """Puts the frames of a stream in order, decodes them, and gives their samples a time.
+
+    What comes before the clock has settled is held until then: so the first samples of a stream
+    have as good a time as all others.
+    """
+
+    def __init__(self, decoder: StreamDecoder, clock: SampleClock, host_clock: HostClock,
+                 publish: Publish, *, kernel_stamps: bool) -> None:
+        """Begin a stream.
+
+        Args:
+            decoder: Decodes its frames.
+            clock: Gives its samples their times; one that waits.
+            host_clock: The time of day.
+            publish: Takes the time of a frame's first sample and from one to the next in ns, and
+                the raw values.
+            kernel_stamps: Whether the bus times are those of this host's kernel.
+        """
+        self._decoder, self._clock, self._host_clock = decoder, clock, host_clock
+        self._publish = publish
+        self._kernel_stamps = kernel_stamps
+        self._order = FrameOrder(decoder)
+        self._held: deque[tuple[int, tuple[int, ...]]] = deque()
+        self._correction = int(clock.nominal_period * CORRECTION)
+
+    def handler(self) -> StreamHandler:
+        """Return what takes each frame: payload, bus time in s, arrival in monotonic ns."""
+        order, take = self._order, self._take
+
+        def handle(data: bytearray, bus_time: float, now: int) -> None:
+            if len(data) > 1 and data[1] == order.expected:
+                order.expected = (order.expected + 1) % COUNTER_TURN
+                take(data, bus_time, now)
+            else:
+                for frame in order.sort(Frame(data, bus_time, now)):
+                    take(*frame)
+
+        return handle
+
+    def finish(self) -> None:
+        """Hand over what is held, because nothing more may come."""
+        for frame in self._order.rest():
+            self._take(*frame)
+        self._clock.settle()
+        self._release(len(self._held))
+
+    def _take(self, data: bytes | bytearray, bus_time: float, now: int) -> None:
+        values = self._decoder.decode_frame(bus_time, data, now)
+        if values is None:
+            return
+        clock, host_clock = self._clock, self._host_clock
+        data_sets = self._decoder.format.data_sets
+        number = self._decoder.number * data_sets
+        clock.update(number + data_sets - 1,
+                     host_clock.when(bus_time, now) if self._kernel_stamps else now)
+        if host_clock.rest:
+            host_clock.slew(self._correction)
+        if clock.settled and not self._held:
+            self._publish(clock.time_of(number) + host_clock.offset, clock.period, values)
+            return
+        self._held.append((number, values))
+        if clock.settled:
+            self._release(AT_ONCE)
+
+    def _release(self, most: int) -> None:
+        """Hand over what is held, but no more frames than a subscriber's queue has room for."""
+        clock, offset, held = self._clock, self._host_clock.offset, self._held
+        for _ in range(min(most, len(held))):
+            number, values = held.popleft()
+            self._publish(clock.time_of(number) + offset, clock.period, values)
