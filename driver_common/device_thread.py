@@ -96,6 +96,8 @@ class DeviceThread(threading.Thread):
         self._jobs: queue.SimpleQueue[tuple[Callable[[], Any], Future[Any]] | None] = (
             queue.SimpleQueue())
         self._stopping = False
+        self._may_interrupt = True  # not while it takes leave of the devices
+        self._interrupting = threading.Lock()
         if isinstance(bus, Patient):
             bus.while_waiting(self._run_between)
 
@@ -122,8 +124,9 @@ class DeviceThread(threading.Thread):
         """Close the bus, end the thread and wait for it."""
         self._stopping = True
         self._jobs.put(None)
-        if isinstance(self._bus, Interruptible):
-            self._bus.interrupt()
+        with self._interrupting:
+            if self._may_interrupt and isinstance(self._bus, Interruptible):
+                self._bus.interrupt()
         if self.is_alive():
             self.join()
 
@@ -148,7 +151,10 @@ class DeviceThread(threading.Thread):
             except Exception as error:  # a bug must not end the driver
                 self._on_state(_internal(error))
             finally:
+                with self._interrupting:
+                    self._may_interrupt = False
                 self._bus.close()
+                self._may_interrupt = True
             if not self._stopping:
                 self._run_jobs(backoff.pause())
         self._run_jobs(0)

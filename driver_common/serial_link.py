@@ -9,6 +9,7 @@ import os
 import re
 import socket
 import termios
+import threading
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -58,6 +59,7 @@ class SerialLink:
         self._baud_rate = baud_rate
         self._scheme = port.partition("://")[0].lower() if "://" in port else ""
         self._unanswered = math.inf  # monotonic time of the first request without any answer
+        self._interrupted = threading.Event()
         if not port:
             raise LinkError(f"serial_port is not set; give a device path{_other_ports()}, "
                             f"a URL such as socket://host:port, or sim://MODEL")
@@ -123,6 +125,8 @@ class SerialLink:
         A busy or paused host may have held up adapter, network or simulator as well: the time that
         it took from us is waited once more.
         """
+        if self._interrupted.is_set():
+            raise LinkError("the driver is stopping")
         with self._guarded():
             waiting = self._serial.in_waiting
             first = b"" if waiting else self._first_byte(max(timeout, 0))
@@ -132,6 +136,14 @@ class SerialLink:
             self._unanswered = math.inf
         self._record(Kind.RECEIVED if data else Kind.NOTHING, data)
         return data
+
+    def interrupt(self) -> None:
+        """Have every read end with a LinkError until `resume`; called from another thread."""
+        self._interrupted.set()
+
+    def resume(self) -> None:
+        """Read again, to take leave of the devices."""
+        self._interrupted.clear()
 
     def _first_byte(self, timeout: float) -> bytes:
         start = time.monotonic()

@@ -12,7 +12,14 @@ from collections.abc import Iterable, Mapping
 
 from driver_common import device_bus
 from driver_common.device_bus import DeviceBus
-from driver_common.errors import DriverError, FrameError, NoAnswerError, RefusedError, SettingError
+from driver_common.errors import (
+    DriverError,
+    FrameError,
+    LinkError,
+    NoAnswerError,
+    RefusedError,
+    SettingError,
+)
 from driver_common.settings import Value
 from isys_radar_driver.access import Access
 from isys_radar_driver.acquisition import Acquisition
@@ -95,12 +102,18 @@ class RadarBus(DeviceBus[Radar]):
         """Leave the radars stopped and close the port."""
         if not self.line.is_open:
             return
+        self.line.link.resume()
         for radar in self.devices:
             if radar.is_connected:
                 with contextlib.suppress(DriverError):
                     self.acquisition.stop(radar)
                 radar.forget()
         self.line.close()
+
+    def interrupt(self) -> None:
+        """Have the present step end soon with a LinkError; called from another thread."""
+        with contextlib.suppress(LinkError):  # it is not open
+            self.line.link.interrupt()
 
     def _open_link(self) -> None:
         self.line.open(self.connection.baud_candidates(self.devices[0])[0])

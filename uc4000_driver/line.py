@@ -6,7 +6,6 @@ One request at a time; only `ask_together` has several sensors measure at the sa
 from __future__ import annotations
 
 import contextlib
-import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -118,7 +117,6 @@ class Line:
         self._late_until = 0.0  # monotonic time until which a slow sensor may still reply
         self._use = ""  # what it is in use for
         self._use_until = 0.0  # monotonic time until which that may take
-        self._interrupted = threading.Event()
 
     def open(self) -> None:
         """Open the port; raises LinkError."""
@@ -133,8 +131,9 @@ class Line:
             self._link = None
 
     def interrupt(self) -> None:
-        """Have every wait end with a LinkError from now on; called from another thread."""
-        self._interrupted.set()
+        """Have every wait end soon with a LinkError; called from another thread."""
+        if self._link is not None:
+            self._link.interrupt()
 
     @property
     def link(self) -> SerialLink:
@@ -157,8 +156,6 @@ class Line:
         Raises:
             LinkError: The port failed, or the driver is to stop.
         """
-        if self._interrupted.is_set():
-            raise LinkError("the driver is stopping")
         self._use_until = until
         if until - time.monotonic() > PATIENCE:
             self.on_wait()

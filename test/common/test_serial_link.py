@@ -85,6 +85,16 @@ def test_a_host_that_was_held_up_waits_once_more(terminal, link, monkeypatch):
     late.join()
 
 
+def test_reads_end_while_the_driver_is_stopping(terminal, link):
+    terminal.write(b"something")
+    link.interrupt()
+    for _ in range(2):
+        with pytest.raises(LinkError, match="the driver is stopping"):
+            link.read(DEADLINE)
+    link.resume()
+    assert link.read(DEADLINE) == b"something"
+
+
 def test_bytes_go_out_and_come_in_unchanged(terminal, link):
     everything = bytes(range(256))
     link.write(everything)

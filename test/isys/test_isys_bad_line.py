@@ -269,6 +269,29 @@ def test_a_line_that_is_plugged_in_again_is_opened_and_measures(start, tmp_path)
     assert not again.measuring
 
 
+def test_a_stop_ends_the_search_for_a_radar_and_leaves_the_others_stopped(start):
+    line, radar, silent = start("iSYS-4001", addresses=[128, 129])
+    silent.silent = True
+    bus = RadarBus(line.port, 0, [Options("front", address=128), Options("rear", address=129)],
+                   Recorder())
+    thread = DeviceThread("bus", bus, lambda error: None)
+    thread.start()
+    try:
+        thread.call(lambda: bus.set_active(True))
+        wait_until(lambda: radar.measuring)
+
+        def interrupted():
+            bus.interrupt()
+            while True:
+                bus.poll()
+
+        with pytest.raises(LinkError, match="the driver is stopping"):
+            thread.call(interrupted)
+    finally:
+        thread.stop()
+    assert not radar.measuring
+
+
 def test_closing_leaves_every_radar_stopped(start):
     line, first, second = start("iSYS-4001", addresses=[10, 11])
     master = Master(line.port, Options("front", address=10), Options("rear", address=11)).find()
