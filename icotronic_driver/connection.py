@@ -7,7 +7,13 @@ import time
 
 from driver_common import advice
 from driver_common.device import Note
-from driver_common.errors import DriverError, NoAnswerError, WrongDeviceError
+from driver_common.errors import (
+    DriverError,
+    FrameError,
+    NoAnswerError,
+    RefusedError,
+    WrongDeviceError,
+)
 from icotronic_driver import commands
 from icotronic_driver.access import READINGS, Access, Survey
 from icotronic_driver.commands import decode_name
@@ -92,7 +98,10 @@ class Connection:
         """
         if self._asked_for is None:
             self._require_no_other_host()
-        name, mac = self._access.read_name_and_mac(STH_1)
+        try:
+            name, mac = self._access.read_name_and_mac(STH_1)
+        except (FrameError, NoAnswerError, RefusedError):
+            name = mac = ""
         asked_for = self._asked_for
         if asked_for is not None and asked_for.mac == mac and self._is_wanted(asked_for):
             self._begin_to_connect(asked_for)

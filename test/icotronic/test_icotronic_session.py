@@ -479,6 +479,20 @@ def test_a_connection_that_an_ended_host_left_is_kept_where_it_is_the_wanted_one
     assert_true(server.network.sensor("Spindle"), host.stream())
 
 
+def test_a_connection_that_was_left_to_a_sensor_that_does_not_answer_is_released(
+        start, listen, impatient):
+    server = start()
+    ended = Host(server).find()
+    ended.bus.line.close()
+    simulated = server.network.sensors[0]
+    simulated.ignore.add((SYSTEM, 0x0B, 5))
+    host = listen(server, sensor_name="Test-STH")
+    host.until(lambda: server.network.stu.connected is None)
+    simulated.ignore.clear()
+    host.until(lambda: host.sensor.is_connected)
+    assert "releasing a connection that was left over" in host.heard.notes
+
+
 def test_a_connection_of_a_living_host_is_left_alone(start, listen):
     server = start()
     first = listen(server).find()
