@@ -10,9 +10,11 @@ from driver_common.settings import Raw, Record
 from icotronic_driver import commands
 from icotronic_driver.commands import (
     BLUETOOTH,
+    CONFIGURATION,
     PRODUCT_DATA,
     SELF,
     STATISTICS,
+    SYSTEM,
     IcotronicRecord,
     decode_name,
 )
@@ -28,7 +30,7 @@ from icotronic_driver.values import decode_text
 T = TypeVar("T")
 
 READING_TIMEOUT = 0.3  # s that one reading may take from the others
-SILENCE_LIMIT = 0.7  # s that a new unit may let us wait for answers that do not come
+SILENCE_LIMIT = 0.6  # s that a new unit may let us wait for answers that do not come
 SILENCE_SHARE = 0.375  # of what is left of them, for the next answer
 SHORTEST_WAIT = 0.02  # s, where nothing is left
 
@@ -203,10 +205,17 @@ class Survey(Access):
             return None
 
 
+# Of two commands that say the same of different things, a unit has both or none.
+_PAIRS = {(CONFIGURATION, 0x61): (CONFIGURATION, 0x60), (SYSTEM, 0x06): (SYSTEM, 0x05),
+          (*BLUETOOTH, 15): (*BLUETOOTH, 13)}
+
+
 def _kind(request: Request[Any]) -> tuple[int, ...]:
     """Return who is asked for what, whatever the arguments; of some blocks all is alike."""
     identifier, data = request.frame.identifier, request.frame.data
+    command: tuple[int, ...] = identifier.block, identifier.block_command
     if identifier.block in (PRODUCT_DATA, STATISTICS):
-        return identifier.receiver, identifier.block
-    command = identifier.block, identifier.block_command
-    return identifier.receiver, *command, *(data[:1] if command == BLUETOOTH else b"")
+        command = command[:1]
+    elif command == BLUETOOTH:
+        command = *command, data[0]
+    return identifier.receiver, *_PAIRS.get(command, command)
