@@ -61,6 +61,7 @@ class Acquisition:
         self._told_rate = ""
         self._told_pace = False
         self._pace_since = 0.0, 0  # time in s and number of a frame
+        self._deviation = 0.0  # of the pace, when it was measured last
         self._next_reading = 0.0
         self._readings = itertools.cycle(READINGS)
 
@@ -209,7 +210,8 @@ class Acquisition:
             kernel_stamps=self._line.interface == "socketcan")
         self._line.on_stream = self._reception.handler()
         self._last_frame, self._told_loss = time.monotonic(), False
-        self._pace_since, self._told_pace = (self._last_frame, 0), False
+        self._pace_since, self._deviation = (self._last_frame, 0), 0.0
+        self._told_pace = False
         try:
             self._line.request(commands.START_ACCELERATION.request(STH_1, form),
                                self._longest_silence / 2)  # the first frame is the answer
@@ -246,7 +248,9 @@ class Acquisition:
         self._pace_since = last, decoder.number
         expected = decoder.format.frame_rate(self._sensor.adc.sample_rate)
         share = (decoder.number - first) / (last - since) / expected
-        if abs(share - 1) > RATE_DEVIATION:
+        before, self._deviation = self._deviation, share - 1
+        # A busy host makes the pace slow and then fast.
+        if min(before, share - 1) > RATE_DEVIATION or max(before, share - 1) < -RATE_DEVIATION:
             self._look_after_pace(share)
 
     def _look_after_pace(self, share: float) -> None:
