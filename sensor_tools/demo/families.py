@@ -151,7 +151,8 @@ def compare_vibration(messages: Sequence[Any], machine: Machine) -> Comparison:
     part = slice(0, len(times), max(1, len(times) // 5000))
     delay = best_delay(times[part], measured[part], TIMING)
     delays = np.full_like(times, delay)
-    reach = CLOCK_LATEST * late + np.where(times < times[0] + SETTLING, SETTLING_TIMING, 0.0)
+    reach = np.minimum(CLOCK_LATEST * late, TIMING)
+    reach[times < times[0] + SETTLING] += SETTLING_TIMING
     gaps = np.flatnonzero(np.abs(np.diff(times) * AdcConfiguration().sample_rate - 1.0) > 0.1) + 1
     for piece in np.split(np.arange(len(times)), np.union1d(gaps, np.arange(0, len(times), PIECE))):
         if piece.size:
@@ -176,7 +177,8 @@ def best_delay(times: Array, measured: Array, reach: float) -> float:
     places = np.clip(np.round((times - times[0]) / DELAY_STEP), 0, GRID).astype(int)
     grid = vibration_in_x(
         times[0] + np.arange(-steps, places.max() + steps + 1) * DELAY_STEP)
-    misfits = [np.mean((grid[places + step] - measured) ** 2) for step in range(2 * steps + 1)]
+    shifted = grid[places[:, np.newaxis] + np.arange(2 * steps + 1)]
+    misfits = np.mean((shifted - measured[:, np.newaxis]) ** 2, axis=0)
     return float(steps - np.argmin(misfits)) * DELAY_STEP
 
 
