@@ -32,6 +32,7 @@ BOARD_TEMPERATURES = {"dsp": commands.READ_DSP_TEMPERATURE, "rfe": commands.READ
 EXPLAIN_AFTER = 3.0  # s without a radar after which it is worth the time to look for the reason
 KEEP_ALIVE = 1.0  # s between requests to a radar that is not measuring
 CHECK_PERIOD = 5.0  # s between checks for a reset while it measures
+CHECKED_TIME = 0.5  # s that a check holds on a line that often damages requests
 CHECK_TIME = 0.020  # s that a check may take beside its bytes, with a slow adapter
 CHECK_SIZE = 40  # bytes of request and reply
 SOCKET = "socket://"  # a port that takes any baud rate, as the line is somewhere else
@@ -236,8 +237,10 @@ class Connection:
 
     def is_check_due(self, radar: Radar) -> bool:
         """Whether to look for a reset: after a silence, and now and then if it costs no cycle."""
-        if radar.misses or radar.refused or radar.unchecked:
+        if radar.refused or radar.unchecked:
             return True
+        if radar.misses:
+            return not self._line.in_doubt or time.monotonic() > radar.checked + CHECKED_TIME
         return time.monotonic() > radar.check_due and self._acquisition.has_time_for(
             radar, self._line.link.seconds(CHECK_SIZE) + CHECK_TIME)
 
@@ -249,6 +252,7 @@ class Connection:
         radar.check_due = time.monotonic() + CHECK_PERIOD
         setting = radar.settings[name]
         raws = self._access.read_record(radar, record_of(setting), Location.RAM)
+        radar.checked = time.monotonic()
         reported = setting.decode(raws[setting.field])
         if reported != radar.values[name]:
             self.configure_again(radar, f"{name} is {setting.text(reported)}, it was "

@@ -115,6 +115,7 @@ class Radar(Device):
         refused: How many steps in a row it refused.
         checks: How often it was checked for a reset.
         check_due: Monotonic time in s of the next check.
+        checked: Monotonic time in s of the last one.
     """
 
     KIND = "radar"
@@ -144,6 +145,7 @@ class Radar(Device):
         self.refused = 0
         self.checks = 0
         self.check_due = 0.0
+        self.checked = -math.inf
 
     def __str__(self) -> str:
         """Return name or address for messages."""
@@ -162,6 +164,7 @@ class Radar(Device):
         self.fixed_targets = 0
         self.refused = 0
         self.absent.clear()
+        self.checked = -math.inf
         self.forget_lists()
 
     def forget_lists(self) -> None:

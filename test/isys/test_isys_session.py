@@ -19,6 +19,7 @@ from isys_master import (
     function_code,
     half_a_step,
 )
+from virtual_line import VirtualLink, VirtualMaster, VirtualTime
 
 from driver_common.errors import NoAnswerError, RefusedError, SettingError, WrongDeviceError
 from driver_common.simulator.line import Faults
@@ -804,10 +805,10 @@ def test_a_radar_that_is_silent_on_what_is_optional_is_used(start, monkeypatch):
 
 
 @pytest.mark.parametrize("there", [True, False])
-def test_the_range_bound_is_offered_where_the_firmware_has_it(start, there):  # N13
-    line, simulated = start("iSYS-4001", range_bound=there)
-    simulated.scene = lambda now: [Target(40.0, 1.0, 30.0, 0.0), Target(40.0, 1.0, 90.0, 0.0)]
-    master = Master(line.port).find()
+def test_the_range_bound_is_offered_where_the_firmware_has_it(monkeypatch, there):  # N13
+    link = VirtualLink(VirtualTime(), "iSYS-4001", range_bound=there)
+    link.radars[0].scene = lambda now: [Target(40.0, 1.0, distance, 0.0) for distance in (30, 90)]
+    master = VirtualMaster(monkeypatch, link, Options())
     assert ("range_bound" in master.radar.settings) == there
     assert master.heard.warnings == []
     assert len(master.measure()[0].targets) == 2
@@ -815,7 +816,6 @@ def test_the_range_bound_is_offered_where_the_firmware_has_it(start, there):  # 
         assert master.radar.values["range_bound"] == "150_m"
         master.maintenance.write(master.radar, {"range_bound": "50_m"})  # it is stopped for that
         assert len(master.lists()[0].targets) == 1
-    master.bus.close()
 
 
 # --- nonsense ----------------------------------------------------------------------------------

@@ -9,6 +9,8 @@ from __future__ import annotations
 import heapq
 import itertools
 
+from isys_master import Master
+
 from driver_common import device_bus
 from driver_common.serial_link import BITS_PER_BYTE
 from driver_common.simulator.line import Faults
@@ -50,10 +52,11 @@ class VirtualLink:
         faults: What happens to the bytes, in both directions.
     """
 
-    def __init__(self, clock, *models):
+    def __init__(self, clock, *models, addresses=(0, 0), **options):
         self.port = "virtual"
         self.clock = clock
-        self.radars = [SimulatedRadar(find_model(model)) for model in models]
+        self.radars = [SimulatedRadar(find_model(model), address, **options)
+                       for model, address in zip(models, addresses, strict=False)]
         self.devices = SimulatedRadars(self.radars)
         self.baud_rate = self.devices.baud_rate
         self.faults = Faults()
@@ -98,3 +101,32 @@ class VirtualLink:
             self._free = due + self.seconds(len(reply))
             self._transmit(due, reply, lambda _, piece: self._arrived.extend(piece))
             self.replies.add(reply)
+
+
+class VirtualMaster(Master):
+    """A bus that the test polls, on a virtual line whose bus alone lets time pass.
+
+    Attributes:
+        link: The line.
+    """
+
+    def __init__(self, monkeypatch, link, *options):
+        """Put link and clock into the driver's modules and find the radars."""
+        self.link = link
+        for module in MODULES:
+            monkeypatch.setattr(module, "time", link.clock)
+        monkeypatch.setattr(line, "SerialLink", lambda *_: link)
+        super().__init__("virtual", *options, baud_rate=link.baud_rate)
+        self.find()
+
+    def until(self, condition):
+        """Poll until the condition holds, for an hour at most."""
+        end = self.link.clock.now + 3600.0
+        while not condition():
+            assert self.link.clock.now < end, f"lost: {self.heard.lost}, notes: {self.heard.notes}"
+            self.link.clock.sleep(self.bus.poll())
+
+    def run(self, seconds):
+        """Poll for some time."""
+        end = self.link.clock.now + seconds
+        self.until(lambda: self.link.clock.now >= end)
