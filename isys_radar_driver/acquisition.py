@@ -120,7 +120,7 @@ class Acquisition:
             radar.statistics.implausible_lists += 1
             return
         missed = radar.count_list(begin, clipping=targets.clipping, shared=len(self._radars) > 1)
-        listener.on_target_list(radar, targets, stamp)
+        listener.on_target_list(radar, targets, radar.time_in_cycle(stamp))
         if options.read_range_list and model.supports(commands.READ_RANGE_LIST):
             range_list, stamp = self._access.timed(radar, commands.READ_RANGE_LIST, timeout)
             if radar.limits().allow_range(range_list.range):

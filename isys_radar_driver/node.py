@@ -341,6 +341,9 @@ class IsysRadarNode(DeviceNode, Listener):
             "dropped bytes": line.parser.dropped_bytes,
             "stale frames": line.stale_frames,
             "unsaved settings": ", ".join(sorted(radar.unsaved))}
+        if radar.cycles is not None:
+            values["regular cycles"] = radar.cycles.is_regular
+            values |= diagnostics.clock_values(radar.cycles.clock, radar.cycles.breaks)
         values |= {f"{name} temperature [°C]": celsius
                    for name, celsius in radar.temperatures.items()}
         values |= radar.differences

@@ -8,8 +8,10 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from driver_common.cycle_clock import CycleClock
 from driver_common.device import Device, DeviceOptions
 from driver_common.errors import NoAnswerError
+from driver_common.sample_clock import HostClock
 from driver_common.serial_link import BITS_PER_BYTE
 from driver_common.settings import RecordAccess, Value, read_settings
 from isys_radar_driver.commands import Version
@@ -110,6 +112,7 @@ class Radar(Device):
         aligned: Monotonic time in s of its last start.
         continuity: How its target lists go on from each other.
         arrivals: Monotonic times in s at which target lists began, the last few seconds.
+        cycles: Gives target lists their times; None before the first one.
         clippings: Those of them that told of an overloaded receiver.
         fixed_targets: Learned length of fixed-length lists, 0 while unknown.
         refused: How many steps in a row it refused.
@@ -140,6 +143,7 @@ class Radar(Device):
         self.aligned = 0.0
         self.continuity = Continuity()
         self.arrivals: deque[float] = deque()
+        self.cycles: CycleClock | None = None
         self.clippings: deque[float] = deque()
         self.fixed_targets = 0
         self.refused = 0
@@ -168,9 +172,20 @@ class Radar(Device):
         self.forget_lists()
 
     def forget_lists(self) -> None:
-        """Count rate and lost cycles from the next target list on."""
+        """Count rate, lost cycles and time from the next target list on."""
         self.arrivals.clear()
         self.clippings.clear()
+        self.cycles = None
+
+    def time_in_cycle(self, arrival: int) -> int:
+        """Return when a cycle ended, without the jitter of the target list's arrival.
+
+        Both are times of the host in ns.
+        """
+        if self.cycles is None:
+            self.cycles = CycleClock(self.cycle_time)
+        offset = HostClock().offset
+        return self.cycles.stamp(arrival - offset) + offset
 
     def write(self, access: RecordAccess, changes: Mapping[str, Value]) -> dict[str, Value]:
         """Write settings, see `Device.write`; some are stored for good at once."""
