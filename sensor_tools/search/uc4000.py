@@ -15,7 +15,7 @@ from uc4000_driver.telegram import BAUD_RATE, FIRST_ADDRESS, LAST_ADDRESS
 
 FAMILY = "uc4000"
 ADDRESSES = range(FIRST_ADDRESS, LAST_ADDRESS + 1)
-ATTEMPTS, SILENCES = 4, 2
+ATTEMPTS, SILENCES = 5, 3
 
 
 def search(place: SerialPlace, progress: Progress) -> Iterator[Result]:

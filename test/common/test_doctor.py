@@ -16,19 +16,19 @@ import can
 import pytest
 import rclpy
 import serial
-from bench_sensors import Bench, run
+from bench_sensors import Bench, VirtualLink, run
 
 from driver_common.simulator.bus import CanFrame
 from sensor_tools.cli.places import Wanted
 from sensor_tools.doctor import can_bus, middleware, serial_port
-from sensor_tools.search import icotronic, isys
+from sensor_tools.search import icotronic
 from sensor_tools.search.place import CanPlace, SerialPlace
 from sensor_tools.search.result import Progress
 
 
 @pytest.fixture
-def bench():
-    bench = Bench()
+def bench(monkeypatch):
+    bench = Bench(monkeypatch)
     yield bench
     bench.close()
 
@@ -105,14 +105,13 @@ def test_a_port_that_another_program_holds(bench, doctor):
     assert "it is in use by python" in cause
 
 
-def test_silence(bench, doctor):
-    port, _ = bench.empty_port()
-    wrong, _ = doctor("--port", port)
+def test_silence(monkeypatch, doctor):
+    VirtualLink.answering(monkeypatch, b"")
+    wrong, _ = doctor("--port", VirtualLink.PORT)
     assert wrong == ["no sensor answers, at no address and no baud rate"]
 
 
-def test_noise(bench, doctor, monkeypatch):
-    monkeypatch.setattr(isys, "ADDRESSES", range(2, 4))
+def test_noise(bench):
     port, master = bench.empty_port()
     ended = threading.Event()
 
@@ -132,21 +131,10 @@ def test_noise(bench, doctor, monkeypatch):
     assert noise.cause.startswith("bytes arrive that nobody asked for (")
 
 
-class Garbage:
-    """A device that answers everything with what is no frame."""
-
-    baud_rate = 115200
-
-    def receive(self, data, now):
-        return [(now, b"\xa5\x5a\x00\x81\x7e\x33\x44\x55")]
-
-
-def test_answers_that_are_no_frames(bench, doctor, monkeypatch):
-    line, _ = bench.radars("iSYS-4001")
-    line._device = Garbage()
-    monkeypatch.setattr(isys.search, "__defaults__", (range(2, 5),))
-    wrong, _ = doctor("--port", line.port, "--family", "isys")
-    assert "bytes arrive that are no iSYS frames" in wrong
+def test_answers_that_are_no_frames(monkeypatch, doctor):
+    VirtualLink.answering(monkeypatch, b"\xa5\x5a\x00\x81\x7e\x33\x44\x55", 115200)
+    wrong, _ = doctor("--port", VirtualLink.PORT)
+    assert wrong == ["bytes arrive that are no iSYS frames"]
 
 
 @pytest.mark.parametrize(("words", "cause"), [
@@ -154,41 +142,34 @@ def test_answers_that_are_no_frames(bench, doctor, monkeypatch):
     (["--baud", "115200"], "a sensor answers at 9600 Bd, not at 115200"),
     (["--family", "uc4000"],
      "iSYS-4003 answers, which is no Pepperl+Fuchs UC4000 ultrasonic sensor")])
-def test_another_sensor_than_the_one_that_is_wanted(bench, doctor, words, cause):
-    line, _ = bench.radars("iSYS-4003", addresses=[30])
-    wrong, _ = doctor("--port", line.port, *words)
+def test_another_sensor_than_the_one_that_is_wanted(monkeypatch, doctor, words, cause):
+    VirtualLink.radars(monkeypatch, ("iSYS-4003", 30))
+    wrong, _ = doctor("--port", VirtualLink.PORT, *words)
     assert wrong == [cause]
 
 
-def test_several_sensors_with_one_address(bench, doctor):
-    line, _ = bench.ultrasonic_sensors(1, 4, 4)
-    wrong, well = doctor("--port", line.port)
+def test_several_sensors_with_one_address(monkeypatch, doctor):
+    VirtualLink.ultrasonic_sensors(monkeypatch, 1, 4, 4)
+    wrong, well = doctor("--port", VirtualLink.PORT)
     assert wrong == ["only damaged answers come from address 4"]
     assert any("address 1" in cause for cause in well)
 
 
-def test_an_own_echo_is_told_but_not_wrong(bench, doctor):
-    line, _ = bench.ultrasonic_sensors(4)
-    line.faults.echo = True
-    wrong, well = doctor("--port", line.port)
+@pytest.mark.parametrize("family", ["radars", "ultrasonic_sensors"])
+def test_an_own_echo_is_told_but_not_wrong(monkeypatch, doctor, family):
+    wanted = ("iSYS-4001", 30) if family == "radars" else 4
+    made = getattr(VirtualLink, family)(monkeypatch, wanted)
+    (made[0] if family == "radars" else made).echo = True
+    wrong, well = doctor("--port", VirtualLink.PORT)
     assert not wrong
     assert "the line returns what is sent" in well
 
 
-def test_an_echo_without_an_answer_shows_how_far_the_line_is_right(bench, doctor):
-    line, (sensor,) = bench.ultrasonic_sensors(4)
-    line.faults.echo = sensor.silent = True
-    wrong, well = doctor("--port", line.port)
+def test_an_echo_without_an_answer_shows_how_far_the_line_is_right(monkeypatch, doctor):
+    VirtualLink.answering(monkeypatch, b"").echo = True
+    wrong, well = doctor("--port", VirtualLink.PORT)
     assert wrong == ["the line returns what is sent, so it is right up to there"]
     assert well.count("the line returns what is sent") == 1
-
-
-def test_an_echo_of_a_radar_line_is_told(bench, doctor):
-    line, _ = bench.radars("iSYS-4001")
-    line.faults.echo = True
-    wrong, well = doctor("--port", line.port)
-    assert not wrong
-    assert "the line returns what is sent" in well
 
 
 @pytest.mark.parametrize(("milliseconds", "causes"), [
@@ -294,6 +275,7 @@ def test_what_the_kernel_says_of_a_controller(fake_ip, text, code, causes):
 
 def test_a_small_receive_buffer(bench, monkeypatch):
     _, words = bench.network()
+    monkeypatch.setattr(icotronic, "RANGE_TIME", 0.3)
     monkeypatch.setattr("icotronic_driver.line.Line.buffer_warning",
                         "the kernel keeps only 208 KiB; 'sudo sysctl …' allows more")
     where = CanPlace(words[1], words[3], options=(words[5], words[7]))
@@ -319,13 +301,15 @@ def test_variables_that_limit_discovery(environment, causes):
         assert finding.cause.startswith(cause)
 
 
-def test_nodes_of_the_same_name(monkeypatch):
+def test_nodes_of_the_same_name():
     context = rclpy.Context()
     rclpy.init(context=context)
     nodes = [rclpy.create_node(name, namespace="/cart", context=context)
              for name in ("radar", "radar", "other")]
+    causes, deadline = [], time.monotonic() + 40
     try:
-        causes = [one.cause for one in middleware.examine() if one.check == "names"]
+        while not causes and time.monotonic() < deadline:  # they are discovered
+            causes = [one.cause for one in middleware.examine() if one.check == "names"]
     finally:
         for node in nodes:
             node.destroy_node()

@@ -1,11 +1,11 @@
-"""Looking for sensors on real transports: who is found, what is wrong, and that nothing changes."""
+"""Looking for sensors: who is found, what is wrong, and that nothing changes."""
 
 from __future__ import annotations
 
 import time
 
 import pytest
-from bench_sensors import Bench
+from bench_sensors import Bench, VirtualLink
 
 from driver_common.simulator.bus import CanFrame
 from icotronic_driver.identifier import SPU_1, STU_1, Identifier
@@ -16,12 +16,13 @@ from sensor_tools.search.place import CanPlace, SerialPlace
 from sensor_tools.search.result import Finding, Found, Progress
 from uc4000_driver.telegram import REQUEST_LENGTH, Request
 
+PORT = SerialPlace(VirtualLink.PORT)
 SCAN_LIMIT = 20.0  # s, of a full scan of a port
 
 
 @pytest.fixture
-def bench():
-    bench = Bench()
+def bench(monkeypatch):
+    bench = Bench(monkeypatch)
     yield bench
     bench.close()
 
@@ -51,144 +52,121 @@ def search(module, where, *more):
 
 # --- iSYS --------------------------------------------------------------------------------------
 
+@pytest.fixture
+def radars(monkeypatch):
+    """Put radars on a virtual port: (model, address) each."""
+    return lambda *wanted: VirtualLink.radars(monkeypatch, *wanted)
+
+
 @pytest.mark.parametrize("model", ["iSYS-4001", "iSYS-4003", "iSYS-6005", "iSYS-5010"])
-def test_a_radar_is_found_at_its_rate(bench, model):
-    line, _ = bench.radars(model, addresses=[31])
-    (found,), findings = search(isys, SerialPlace(line.port))
+def test_a_radar_is_found_at_its_rate(radars, model):
+    radars((model, 31))
+    (found,), findings = search(isys, PORT)
     assert (found.model, found.address, found.rate) == (model, "31", MODELS[model].baud_rate)
     assert (found.serial_number, found.firmware) == ("000001", "1.310")
     assert found.parameters == {"address": 31, "serial_baud": MODELS[model].baud_rate}
     assert not findings
 
 
-def test_several_radars_are_found_one_by_one(bench):
-    line, _ = bench.radars("iSYS-4001", "iSYS-4002", addresses=[30, 33])
-    found, findings = search(isys, SerialPlace(line.port), range(28, 36))
-    assert [(one.model, one.address) for one in found] == [("iSYS-4001", "30"),
-                                                           ("iSYS-4002", "33")]
+def test_several_radars_are_found_one_by_one(radars):
+    radars(("iSYS-4001", 30), ("iSYS-4002", 255), ("iSYS-6003", 2))
+    found, findings = search(isys, PORT)
+    assert [(one.model, one.address) for one in found] == [
+        ("iSYS-6003", "2"), ("iSYS-4001", "30"), ("iSYS-4002", "255")]
     assert not findings
 
 
 @pytest.mark.parametrize(("models", "cause"), [
     (("iSYS-4001", "iSYS-6003"), "only damaged answers come from address 30"),
     (("iSYS-4001", "iSYS-4002"), "a device with product information 4000 answered")])
-def test_radars_with_the_same_address_are_noticed(bench, models, cause):
-    line, _ = bench.radars(*models, addresses=[30, 30])
-    found, (finding,) = search(isys, SerialPlace(line.port, 115200), range(28, 36))
+def test_radars_with_the_same_address_are_noticed(radars, models, cause):
+    radars(*((model, 30) for model in models))
+    found, (finding,) = search(isys, PORT)
     assert not found
     assert finding.cause.startswith(cause)
     assert finding.remedy.startswith("several devices have address 30")
 
 
-def test_a_radar_that_measures_by_itself_measures_on(bench):
-    line, (radar,) = bench.radars("iSYS-4001")
-    radar.self_starting = True
-    radar.power_cycle()
+def test_a_radar_that_measures_measures_on(radars):
+    link, (radar,) = radars(("iSYS-4001", 128))
+    radar.measuring = True
+    assert search(isys, PORT)[0]
     assert radar.measuring
-    deadline = time.monotonic() + 20
-    while not search(isys, SerialPlace(line.port, 115200))[0] and time.monotonic() < deadline:
-        pass  # it starts up
-    assert radar.measuring
-    codes = {frame.function_code for frame in FrameParser().feed(bytes(bench.heard))
+    codes = {frame.function_code for frame in FrameParser().feed(bytes(link.heard))
              if frame.source == MASTER}
-    assert codes <= {0xD0, 0xD2, 0xD6}  # device name, sensor settings, versions: all of them reads
+    assert codes == {0xD0, 0xD2, 0xD6}  # device name, sensor settings, versions: all of them reads
 
 
-class DeafLine:
-    """A serial port with a clock of its own: every wait is over at once."""
-
-    time = 0
-
-    def __init__(self, clock, garbage_at):
-        self.clock = clock
-        self.garbage_at = garbage_at
-        self.baud_rate = 0
-        self.waiting = b""
-
-    def __call__(self, port, baud_rate, recorder=None):
-        self.baud_rate = baud_rate
-        return self
-
-    def seconds(self, length):
-        return length * 10 / self.baud_rate
-
-    def write(self, data):
-        if self.baud_rate == self.garbage_at:
-            self.waiting = b"\x55" * 8
-
-    def read(self, timeout):
-        data, self.waiting = self.waiting, b""
-        self.clock.now += 0.001 if data else max(timeout, 0.0001)
-        return data
-
-    def close(self):
-        pass
+def test_an_echo_is_no_answer(radars):
+    link, _ = radars(("iSYS-4003", 31))
+    link.echo = True
+    (found,), (finding,) = search(isys, PORT)
+    assert (found.address, found.rate) == ("31", 9600)
+    assert (finding.cause, finding.is_wrong) == ("the line returns what is sent", False)
 
 
-class Clock:
-    now = 1000.0
-
-    def monotonic(self):
-        return self.now
-
-
-@pytest.mark.parametrize("garbage_at", [0, 9600, 115200])
-def test_a_full_scan_of_a_port_ends_in_time(monkeypatch, garbage_at):
-    clock = Clock()
-    monkeypatch.setattr(time, "monotonic", clock.monotonic)
-    for module in ("isys_radar_driver.line", "uc4000_driver.line"):
-        monkeypatch.setattr(f"{module}.SerialLink", DeafLine(clock, garbage_at))
+@pytest.mark.parametrize("rate", [0, 9600, 115200])
+def test_a_full_scan_of_a_port_ends_in_time(monkeypatch, rate):
+    link = VirtualLink.answering(monkeypatch, b"\x55" * 8, rate)
+    causes = []
     for module in (uc4000, isys):
-        assert not search(module, SerialPlace("/dev/ttyDeaf"))[0]
-    assert 1.0 < clock.now - Clock.now < SCAN_LIMIT
+        found, findings = search(module, PORT)
+        assert not found
+        causes += [one.cause for one in findings]
+    assert causes == (["bytes arrive that are no iSYS frames"] if rate else [])
+    assert 1.0 < link.now - link.begin < SCAN_LIMIT
 
 
 # --- UC4000 ------------------------------------------------------------------------------------
 
-def test_all_ultrasonic_sensors_on_a_wire_are_found(bench):
-    line, _ = bench.ultrasonic_sensors(1, 3, 7)
-    found, findings = search(uc4000, SerialPlace(line.port))
+@pytest.fixture
+def ultrasonic_sensors(monkeypatch):
+    """Put ultrasonic sensors with these addresses on a virtual port."""
+    return lambda *addresses: VirtualLink.ultrasonic_sensors(monkeypatch, *addresses)
+
+
+def test_all_ultrasonic_sensors_on_a_wire_are_found(ultrasonic_sensors):
+    ultrasonic_sensors(1, 3, 7)
+    found, findings = search(uc4000, PORT)
     assert [(one.address, one.rate) for one in found] == [("1", 19200), ("3", 19200), ("7", 19200)]
     assert len({one.serial_number for one in found}) == 3
     assert {one.firmware for one in found} == {"HW:V0.1 SW:V1.200"}
     assert not findings
 
 
-def test_a_wire_that_returns_what_is_sent_is_told(bench):
-    line, _ = bench.ultrasonic_sensors(2)
-    line.faults.echo = True
-    found, (finding,) = search(uc4000, SerialPlace(line.port))
+def test_a_wire_that_returns_what_is_sent_is_told(ultrasonic_sensors):
+    ultrasonic_sensors(2).echo = True
+    found, (finding,) = search(uc4000, PORT)
     assert [one.address for one in found] == ["2"]
     assert (finding.cause, finding.is_wrong) == ("the line returns what is sent", False)
 
 
-def test_ultrasonic_sensors_with_the_same_address_are_noticed(bench):
-    line, _ = bench.ultrasonic_sensors(2, 2)
-    _, findings = search(uc4000, SerialPlace(line.port))
+@pytest.mark.parametrize("addresses", [(2, 2), (1, 2, 2), (2, 2, 3)])
+def test_ultrasonic_sensors_with_the_same_address_are_noticed(ultrasonic_sensors, addresses):
+    ultrasonic_sensors(*addresses)
+    _, findings = search(uc4000, PORT)
     assert [finding.cause for finding in findings] == ["only damaged answers come from address 2"]
 
 
-def test_what_is_damaged_everywhere_is_no_sensor(bench):
-    line, _ = bench.ultrasonic_sensors(1)
-    line.faults.corrupt = 1.0
-    line._device.receive = lambda data, now: [(now, b"\x55\x12")]
-    found, findings = search(uc4000, SerialPlace(line.port))
+def test_what_is_damaged_everywhere_is_no_sensor(monkeypatch):
+    VirtualLink.answering(monkeypatch, b"\x55\x12", 19200)
+    found, findings = search(uc4000, PORT)
     assert not found
     assert [one.cause for one in findings] == ["bytes arrive that are no UC4000 frames"]
 
 
-def test_ultrasonic_sensors_are_only_read(bench):
-    line, _ = bench.ultrasonic_sensors(1, 5)
-    search(uc4000, SerialPlace(line.port))
-    telegrams = [Request.decode(bytes(bench.heard[start:start + REQUEST_LENGTH]))
-                 for start in range(0, len(bench.heard), REQUEST_LENGTH)]
+def test_ultrasonic_sensors_are_only_read(ultrasonic_sensors):
+    heard = ultrasonic_sensors(1, 5).heard
+    search(uc4000, PORT)
+    telegrams = [Request.decode(bytes(heard[start:start + REQUEST_LENGTH]))
+                 for start in range(0, len(heard), REQUEST_LENGTH)]
     assert len(telegrams) > 7
     assert not any(telegram.is_write for telegram in telegrams)
 
 
-def test_ultrasonic_sensors_have_one_rate_only(bench):
-    line, _ = bench.ultrasonic_sensors(1)
-    assert search(uc4000, SerialPlace(line.port, 115200)) == ([], [])
+def test_ultrasonic_sensors_have_one_rate_only(ultrasonic_sensors):
+    ultrasonic_sensors(1)
+    assert search(uc4000, SerialPlace(PORT.port, 115200)) == ([], [])
 
 
 # --- ICOtronic ---------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ from pathlib import Path
 import click
 import pytest
 import yaml
-from bench_sensors import Bench, run
+from bench_sensors import PATIENCE, Bench, run
 
 from isys_radar_driver.simulator.radar import SimulatedRadar
 from sensor_tools import document, node_files
@@ -30,8 +30,8 @@ RADAR = ("--family", "isys", "--baud", 115200)
 
 
 @pytest.fixture
-def bench():
-    bench = Bench()
+def bench(monkeypatch):
+    bench = Bench(monkeypatch)
     yield bench
     bench.close()
 
@@ -237,6 +237,7 @@ def test_a_sensor_moves_to_another_address(bench, command):
     outcome = command("change-address", "5", "--port", line.port, "--address", 3)
     assert outcome.out == "the sensor moved from address 3 to 5 and keeps it\n"
     assert sensor.address == 5
+    bench.expect(addresses=(5, 6), ultrasonic_time=PATIENCE)
     outcome = command("change-address", "6", "--port", line.port, "--address", 5)
     assert (outcome.code, "belongs to another" in outcome.err) == (1, True)
 
