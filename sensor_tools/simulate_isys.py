@@ -46,7 +46,7 @@ def open_simulation(options: argparse.Namespace) -> Simulation:
 
     names = ", ".join(f"{radar.model.name} at address {radar.address}" for radar in radars)
     return Simulation(
-        f"{options.link or line.port}: {names}",
+        f"{line.port}: {names}",
         {**{name.replace("_", "-"): switch(radars, name)
             for name in ("silent", "clipping", "strict", "self_starting", "bare", "nonsense")},
          "power-cycle": power_cycle, **fault_commands(line.faults, LINE_FAULTS)}, line.close)

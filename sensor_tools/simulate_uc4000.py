@@ -61,7 +61,7 @@ def open_simulation(options: argparse.Namespace) -> Simulation:
     line.start()
     addresses = ", ".join(str(sensor.address) for sensor in sensors)
     return Simulation(
-        f"{options.link or line.port}: UC4000 at address {addresses}",
+        f"{line.port}: UC4000 at address {addresses}",
         commands | fault_commands(line.faults, LINE_FAULTS), line.close)
 
 

@@ -235,13 +235,14 @@ class _Pty:
         self._master, self._slave = os.openpty()
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
-        self.port = os.ttyname(self._slave)
+        terminal = os.ttyname(self._slave)
+        self.port = link or terminal
         self._link = Path(link) if link else None
         if self._link is not None:
             try:
                 if self._link.is_symlink():
                     self._link.unlink()
-                self._link.symlink_to(self.port)
+                self._link.symlink_to(terminal)
             except OSError as error:
                 raise LinkError(f"cannot make the link {link}: {error.strerror}") from error
 
