@@ -153,11 +153,18 @@ class Connection:
         silence = advice.SILENCE_BEHIND_ECHO if self._line.echo else advice.SILENCE
         hint = f"; {silence.text()}"
         if self._alone and sensor.options.address != CAST:
-            try:
-                hint = ", but " + advice.ANOTHER_ADDRESS.text(
-                    address=self._ask_address(), rate="", parameters=" address")
-            except WrongDeviceError as several:
-                hint = f", but {several}"
-            except (NoAnswerError, FrameError, RefusedError):
-                pass
+            hint = self._other_address(sensor) or hint
         return NoAnswerError(f"{error}{hint}")
+
+    def _other_address(self, sensor: Sensor) -> str:
+        """Return what to say of the sensors that answer instead, "" where none does."""
+        try:
+            address = self._ask_address()
+        except WrongDeviceError as several:
+            return f", but {several}"
+        except (NoAnswerError, FrameError, RefusedError):
+            return ""
+        if address == sensor.options.address:
+            return f"; {advice.POOR_LINE.text()}"
+        return ", but " + advice.ANOTHER_ADDRESS.text(address=address, rate="",
+                                                      parameters=" address")

@@ -7,7 +7,7 @@ import time
 from collections.abc import Iterator, Mapping
 
 from driver_common import advice
-from driver_common.errors import NoAnswerError, WrongDeviceError
+from driver_common.errors import DriverError, FrameError, NoAnswerError, WrongDeviceError
 from sensor_tools.cli.output import progress_bar
 from sensor_tools.cli.places import Wanted, require_place
 from sensor_tools.cli.values import value_of
@@ -15,6 +15,7 @@ from sensor_tools.families import FAMILIES, Bus, Device, Family, families_of, se
 from sensor_tools.measurements import Take, ignore
 from sensor_tools.search.result import Finding, Found
 
+ATTEMPTS = 3
 REACH_TIME = 30.0  # s in which a sensor must be connected; by radio it can take 20
 
 
@@ -51,10 +52,14 @@ class Session:
             DriverError: It does not answer any more.
         """
         end = time.monotonic() + REACH_TIME
+        errors: list[DriverError] = []  # it was found just now, so one may be a mishap
         while not self.device.is_connected:
             pause = self.bus.poll()
-            if self.device.error is not None:
-                raise self.device.error
+            error = self.device.error
+            if error is not None and error not in errors:
+                errors.append(error)
+                if len(errors) == ATTEMPTS or not isinstance(error, (NoAnswerError, FrameError)):
+                    raise error
             if time.monotonic() > end:
                 raise NoAnswerError(f"{self.found} does not connect")
             time.sleep(0.0 if self.device.is_connected else pause)

@@ -28,7 +28,7 @@ from uc4000_driver.session import Uc4000Bus
 from uc4000_driver.simulator import sensor as simulated_sensor
 from uc4000_driver.simulator.line import SimulatedSensors
 from uc4000_driver.simulator.sensor import SimulatedSensor
-from uc4000_driver.telegram import ErrorCode, Reply, Request
+from uc4000_driver.telegram import CAST, ErrorCode, Reply, Request
 
 # --- the line's echo ---------------------------------------------------------------------------
 
@@ -79,6 +79,20 @@ def test_no_sensor(connect, echo, text):
     assert str(master.lose()) == text.format(port=line.port)
     simulated.silent = False
     assert master.distances() == [still(0)]
+
+
+def test_a_sensor_that_answers_only_some_requests(connect, monkeypatch):
+    line, (simulated,) = connect(2)
+    master = connect.master(line, Options(address=2))
+    reply = simulated.reply
+
+    def answer_casts(request, now):
+        return reply(request, now) if request.address == CAST else None
+
+    monkeypatch.setattr(simulated, "reply", answer_casts)
+    assert str(master.lose()) == (
+        f"no answer from address 2 on {line.port}; it answers only some requests; check the wiring "
+        "(termination, length, ground)")
 
 
 def test_no_line_while_its_echo_is_expected(connect):
