@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-import time
 from collections.abc import Iterable, Iterator
 from functools import partial
 from typing import Generic, TypeVar
 
+from driver_common import clocks as time
 from driver_common.device import Device, Note
 from driver_common.errors import (
     DriverError,

@@ -26,7 +26,8 @@ from driver_common.device_thread import Bus, DeviceThread
 from driver_common.errors import DriverError, SettingError
 from driver_common.node_recorder import NodeRecorder
 from driver_common.parameters import ParameterStore, refusal
-from driver_common.recording import SERIAL
+from driver_common.recording import SERIAL, read_recording
+from driver_common.replay import recording_path
 from driver_common.settings import Option, Setting, Value
 
 SENSOR_NAME = re.compile("[a-z][a-z0-9_]*")
@@ -93,6 +94,7 @@ class DeviceNode(LifecycleNode):
         """
         super().__init__(name)
         self.store = ParameterStore(self)
+        self._take_recorded_parameters()
         self.bus: Any = None
         self.thread: DeviceThread | None = None
         self.simulator: Simulator | None = None
@@ -130,6 +132,10 @@ class DeviceNode(LifecycleNode):
         """Return the name of the bus in a recording, "" where it has none."""
         return ""
 
+    def link_facts(self) -> dict[str, str]:
+        """Return what a recording says of the link."""
+        return {}
+
     def describe(self, device: Any) -> str:
         """Return what was found, for the log."""
         raise NotImplementedError
@@ -162,6 +168,13 @@ class DeviceNode(LifecycleNode):
     def bus_options(cls) -> list[Option]:
         """Return the options that do not belong to one sensor."""
         return [*([SENSORS] if cls.SEVERAL_SENSORS else []), *COMMON_OPTIONS, *cls.BUS_OPTIONS]
+
+    def _take_recorded_parameters(self) -> None:
+        """Where a recording is to be played: use its parameters, if the user gave no others."""
+        path = recording_path(self.store.overrides)
+        if path is not None:
+            recorded = read_recording(path, head=True).parameters
+            self.store.overrides = {**recorded, **self.store.overrides}
 
     def _check_sensor_names(self) -> None:
         reserved = {option.name for option in self.bus_options()}
@@ -395,6 +408,7 @@ class DeviceNode(LifecycleNode):
 
     def on_step(self, pause: float) -> None:
         """Take note that the bus did a step, and of the time in s until the next one."""
+        self._recorder.look_at_replay()
         self._note_statuses(pause)
 
     def on_bus_state(self, error: DriverError | None) -> None:
@@ -547,7 +561,9 @@ class DeviceNode(LifecycleNode):
         self._note_statuses(0.0)
         self.thread = DeviceThread(f"{self.get_name()} bus", bus, self.on_bus_state,
                                    self.on_step)
-        self.thread.start()
+        self._recorder.begin_replay()
+        if self._recorder.replay is None:  # which waits until what it tells is wanted
+            self.thread.start()
         if self._stopping:
             self.thread.stop()
         return super().on_configure(state)
@@ -556,6 +572,8 @@ class DeviceNode(LifecycleNode):
         """Start measuring and publishing."""
         assert self.thread is not None
         self.thread.post(lambda: self.bus.set_active(True))
+        if self.thread.ident is None:
+            self.thread.start()
         return super().on_activate(state)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:

@@ -10,6 +10,7 @@ from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
+from driver_common import clocks as time
 from driver_common.errors import DriverError, NoAnswerError
 
 T = TypeVar("T")
@@ -167,6 +168,7 @@ class DeviceThread(threading.Thread):
     def _run_jobs(self, pause: float) -> None:
         """Run waiting jobs; with none waiting, wait up to `pause` s for the first one."""
         try:
+            pause = time.waited(pause) if pause > 0 else 0.0
             item = self._jobs.get(timeout=pause) if pause > 0 else self._jobs.get_nowait()
             while item is not None:
                 self._run_job(*item)

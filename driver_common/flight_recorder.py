@@ -14,11 +14,14 @@ from collections.abc import Iterable, Iterator
 from enum import IntEnum
 from typing import NamedTuple
 
+from driver_common import clocks
+
 DURATION = 60.0  # s of traffic that are kept
 MEMORY = 14 * 1024 * 1024  # bytes that they may take
 SEARCH_MEMORY = 1024 * 1024  # bytes for how the devices were found, however long ago that is
 SEARCH_TIME = 10.0  # s before a device was found that are kept …
 START_TIME = 2.0  # … and s after it, in which it is started
+READING = 1000  # ns by which two readings of the clocks may differ
 CHUNK_TIME = 1.0  # s of traffic that are forgotten together, at most
 CHUNK_SIZE = 64 * 1024  # bytes, the same
 
@@ -41,7 +44,8 @@ class Kind(IntEnum):
     LOST = 4  # the link; a text says why
     OFFSET = 5  # the time of day minus the monotonic time in ns
     NOTE = 6  # a text for people
-    GAP = 7  # what follows came later; what was between is forgotten
+    CLOCK = 7  # somebody read the monotonic clock
+    GAP = 8  # what follows came later; what was between is forgotten
 
 
 class Frame(NamedTuple):
@@ -116,9 +120,9 @@ class FlightRecorder:
         self._search: deque[_Chunk] = deque()
         self._size = self._search_size = 0
         self._search_end = 0
-        self.offset = 0
+        self._has_offset = False
+        self.offset = clocks.host_offset()
         self._begin(time.monotonic_ns())
-        self.add_offset(time.time_ns() - time.monotonic_ns())
 
     def add(self, now: int, kind: Kind, content: bytes = b"") -> None:
         """Take what happened at a monotonic time in ns."""
@@ -136,9 +140,27 @@ class FlightRecorder:
 
     def add_offset(self, offset: int) -> None:
         """Take the time of day minus the monotonic time in ns, where it is another one."""
-        if offset != self.offset:
-            self.offset = offset
+        if offset != self.offset or not self._has_offset:
+            self.offset, self._has_offset = offset, True
             self.add(time.monotonic_ns(), Kind.OFFSET, pack_offset(offset))
+
+    def follow_offset(self) -> None:
+        """Read the clocks, and take their offset where it changed by more than reading them can."""
+        offset = clocks.host_offset()
+        if abs(offset - self.offset) > READING or not self._has_offset:
+            self.add_offset(offset)
+
+    def read_offset(self) -> int:
+        """Return the time of day minus the monotonic time in ns; a replay returns the same."""
+        offset = clocks.host_offset()
+        self.add_offset(offset)
+        return offset
+
+    def now(self) -> int:
+        """Return the monotonic time in ns; a replay returns the same."""
+        now = time.monotonic_ns()
+        self.add(now, Kind.CLOCK)
+        return now
 
     def note(self, text: str) -> None:
         """Take a text for people."""

@@ -17,6 +17,7 @@ from driver_common.errors import DriverError
 from driver_common.flight_recorder import DURATION, FlightRecorder, unpack
 from driver_common.recording import RecordingText
 from driver_common.recording_files import RecordingFile, RecordingFiles
+from driver_common.replay import Replay
 from driver_common.settings import Option, Value
 
 if TYPE_CHECKING:
@@ -35,11 +36,13 @@ OPTIONS = (
     Option("recording_limit", kind=int, default=1024, minimum=200, maximum=1024 * 1024, unit="MiB",
            live=True, description="Disk space for the recordings of this node; the oldest are "
                                   "deleted"),
+    Option("replay_rate", kind=float, default=1.0, minimum=0.0, maximum=1000.0,
+           description="How much faster than it was a recording is played; 0 = as fast as can be"),
     Option("record_raw", kind=bool, default=False, live=True,
            description="Write all raw traffic, not only the last minute of it"),
 )
 OWN = frozenset(option.name for option in OPTIONS)  # which say nothing about the devices
-LINKS = ("serial_port", "can_interface", "can_channel", "can_options", "autostart", "replay_rate")
+LINKS = ("serial_port", "can_interface", "can_channel", "can_options", "autostart")
 
 
 class NodeRecorder:
@@ -60,6 +63,34 @@ class NodeRecorder:
         self._raw_text: RecordingText | None = None
         self._raw_until = 0
         self._told = ""
+
+    # --- replay ---
+
+    @property
+    def replay(self) -> Replay | None:
+        """The recording that is played in the place of the link."""
+        recorder = self._recorder
+        return recorder if isinstance(recorder, Replay) else None
+
+    def begin_replay(self) -> None:
+        """Say what is played, where a recording is."""
+        if (replay := self.replay) is None:
+            return
+        replay.clock.rate = self._node.option("replay_rate")
+        self._told = ""
+        facts = replay.recording.facts
+        self._node.get_logger().info(
+            f"playing {replay.path} of {facts.get('node', '?')}, written "
+            f"{facts.get('written', '?')} because of: {facts.get('because', '?')}")
+
+    def look_at_replay(self) -> None:
+        """Say once where a replay does something else; in the thread of the bus."""
+        replay = self.replay
+        if replay is not None and replay.differs and not self._told:
+            self._told = (f"this node asks {replay.differs}, which was not asked "
+                          "then, because of other parameters or another version: from here on what "
+                          "it publishes may differ")
+            self._node.get_logger().warning(self._told)
 
     # --- in the thread of the bus ---
 
@@ -83,7 +114,7 @@ class NodeRecorder:
         now = time.monotonic()
         news = not self._in_outage and now - self._saved > DURATION
         self._in_outage = True
-        if news and self._found and self._node.option("recording_directory"):
+        if news and self._found and not self.replay and self._node.option("recording_directory"):
             self._saved = now
             parts, _ = self._recorder.snapshot()
             self._node.later(lambda: self._log(self._save("outage", text, parts)))
@@ -98,12 +129,14 @@ class NodeRecorder:
         """Write the last minute, and return where it is; raises DriverError."""
         if self._node.bus is None:
             raise DriverError("there is nothing to save: the node is not configured")
+        if self.replay is not None:
+            raise DriverError(f"this is {self.replay.path}, copy that")
         parts, _ = self._recorder.snapshot()
         return f"saved {self._save('request', 'save_recording', parts)}"
 
     def write_raw(self) -> None:
         """Write what is new where all is recorded, or end that."""
-        if self._node.bus is None or not self._node.option("record_raw"):
+        if self._node.bus is None or self.replay or not self._node.option("record_raw"):
             self.finish_raw()
             return
         try:
@@ -174,6 +207,7 @@ class NodeRecorder:
             "versions": f"{PACKAGE} {_version(PACKAGE)}, Python {platform.python_version()}, "
                         + ", ".join(f"{name} {_version(name)}" for name in LIBRARIES)
                         + f", {platform.system()} {platform.release()}",
+            **self._node.link_facts(),
             **{f"device {sensor}".rstrip(): text for sensor, text in self._found.items()},
             **self._settings()}
 

@@ -33,7 +33,7 @@ MAX_FILE = 2 * 1024 ** 3  # bytes that are read
 SECOND = 10 ** 9
 
 _COMMENTS = {kind: kind.name.lower() for kind in (Kind.NOTHING, Kind.OPENED, Kind.LOST, Kind.OFFSET,
-                                                  Kind.NOTE, Kind.GAP)}
+                                                  Kind.NOTE, Kind.CLOCK, Kind.GAP)}
 _KINDS = {word: kind for kind, word in _COMMENTS.items()}
 _DIRECTIONS = {"<": Kind.RECEIVED, ">": Kind.SENT, "R": Kind.RECEIVED, "T": Kind.SENT}
 _ARROWS = {Kind.RECEIVED: "<", Kind.SENT: ">"}
@@ -124,6 +124,8 @@ class RecordingText:
         now = entry.time + self._offset
         shown = round(bus_time * 1e6) if entry.kind is Kind.RECEIVED else now // 1000
         delay = str(now - shown * 1000)
+        if entry.kind is Kind.RECEIVED and shown / 1e6 != bus_time:
+            delay += f"/{round(bus_time * 1e9) - shown * 1000}"
         self._delays.append(delay)
         self._length += len(delay) + 1
         digits = f"{identifier & ~EXTENDED & ~REMOTE:0{8 if identifier & EXTENDED else 3}X}"
@@ -138,8 +140,12 @@ class RecordingText:
         return line
 
 
-def read_recording(path: Path) -> Recording:
+def read_recording(path: Path, *, head: bool = False) -> Recording:
     """Return what is in a file.
+
+    Args:
+        path: The file.
+        head: Whether to read no entries, which takes time.
 
     Raises:
         SettingError: It cannot be read, is something else, or is damaged.
@@ -148,9 +154,17 @@ def read_recording(path: Path) -> Recording:
         if path.stat().st_size > MAX_FILE:
             raise SettingError(f"cannot replay {path}: it is too large")
         with path.open(encoding="utf-8", errors="replace") as file:
-            return _Reader(path).read(file)
+            return _Reader(path).read(_head_of(file) if head else file)
     except OSError as error:
         raise SettingError(f"cannot replay {path}: {error.strerror}") from error
+
+
+def _head_of(lines: Iterable[str]) -> Iterator[str]:
+    for line in lines:
+        if not line.startswith("# ") or line.startswith("# ("):
+            break
+        yield line
+    yield _END
 
 
 class _Reader:
@@ -234,8 +248,13 @@ class _Reader:
         if len(texts) != len(self._undelayed):
             raise ValueError(f"{len(texts)} delays of {len(self._undelayed)} frames")
         for place, text in zip(self._undelayed, texts, strict=True):
+            delay, _, rest = text.partition("/")
             entry = self._entries[place]
-            self._entries[place] = entry._replace(time=entry.time + int(text))
+            if rest:
+                frame = frame_of(entry.content)
+                bus_time = (round(frame.bus_time * 1e6) * 1000 + int(rest)) / 1e9
+                entry = entry._replace(content=pack_frame(frame._replace(bus_time=bus_time)))
+            self._entries[place] = entry._replace(time=entry.time + int(delay))
         self._undelayed.clear()
 
     def _add(self, time: int, kind: Kind, content: bytes) -> None:

@@ -20,13 +20,14 @@ docs/timing.md says what is promised and what trials have shown.
 from __future__ import annotations
 
 import math
-import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from driver_common.arrivals import Envelope, Floats, Line, Prior, Queue
+from driver_common.clocks import host_offset
 
 TOLERANCE = 150e-6  # standard deviation of a crystal's drift before anything arrives
 JITTER = 30e3  # ns that the least delays of blocks vary by, before anything arrives
@@ -65,9 +66,10 @@ class HostClock:
         steps: How often the clock was set.
     """
 
-    def __init__(self) -> None:
-        """Read both clocks."""
-        self.offset = self._read()
+    def __init__(self, read: Callable[[], int] = host_offset) -> None:
+        """Read both clocks; `read` returns their difference in ns."""
+        self._read = read
+        self.offset = read()
         self.rest = 0
         self.steps = 0
 
@@ -97,11 +99,6 @@ class HostClock:
             self.follow()
             on_bus = int(bus_time * 1e9) - self.offset
         return on_bus if 0 <= seen - on_bus < WAITED_MOST else seen
-
-    @staticmethod
-    def _read() -> int:
-        # The largest of some differences: whatever comes between two readings makes them smaller.
-        return max(time.time_ns() - time.monotonic_ns() for _ in range(3))
 
 
 class Stamps:

@@ -125,8 +125,7 @@ class SerialLink:
         A busy or paused host may have held up adapter, network or simulator as well: the time that
         it took from us is waited once more.
         """
-        if self._interrupted.is_set():
-            raise LinkError("the driver is stopping")
+        self._check_interrupted()
         with self._guarded():
             waiting = self._serial.in_waiting
             first = b"" if waiting else self._first_byte(max(timeout, 0))
@@ -140,6 +139,10 @@ class SerialLink:
     def interrupt(self) -> None:
         """Have every read end with a LinkError until `resume`; called from another thread."""
         self._interrupted.set()
+
+    def _check_interrupted(self) -> None:
+        if self._interrupted.is_set():
+            raise LinkError("the driver is stopping")
 
     def resume(self) -> None:
         """Read again, to take leave of the devices."""
@@ -184,9 +187,10 @@ class SerialLink:
             raise LinkError(text) from error
 
     def _record(self, kind: Kind, content: bytes = b"") -> None:
-        now, self.time = time.monotonic_ns(), time.time_ns()
-        self._recorder.add_offset(self.time - now)
+        now = time.monotonic_ns()
+        self._recorder.follow_offset()
         self._recorder.add(now, kind, content)
+        self.time = now + self._recorder.offset
 
 
 def _reason(port: str, error: Exception) -> str:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-import time
 from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
+from driver_common import clocks as time
 from driver_common.errors import DriverError, FrameError, NoAnswerError, RefusedError
 from driver_common.sample_clock import HostClock, SampleClock
 from driver_common.settings import Value, read_settings
@@ -56,7 +56,7 @@ class Acquisition:
         self._wanted = wanted
         self._last_frame = 0.0
         self._told_loss = False
-        self._host_clock = HostClock()
+        self._host_clock = HostClock(line.recorder.read_offset)
         self._reception: Reception | None = None
         self._told_rate = ""
         self._told_pace = False
@@ -223,7 +223,6 @@ class Acquisition:
         """Receive for a moment; look after a stream that fell silent."""
         frames, lost = decoder.statistics.frames, decoder.statistics.lost
         self._host_clock.follow()
-        self._line.recorder.add_offset(self._host_clock.offset)
         self._sensor.pauses.begin()
         self._line.listen(LISTEN_TIME, self._sensor.options.may_wait)
         self._sensor.pauses.end(LISTEN_TIME, decoder.statistics.lost - lost)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-import time
 
 from driver_common import advice
+from driver_common import clocks as time
 from driver_common.device import Note
 from driver_common.errors import (
     DriverError,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import threading
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -13,9 +12,10 @@ from typing import TypeVar
 import can
 
 from driver_common import advice
+from driver_common import clocks as time
 from driver_common.can_link import RECEIVE_BUFFER, CanLink, parse_options
 from driver_common.errors import FrameError, LinkError, NoAnswerError
-from driver_common.flight_recorder import FlightRecorder
+from driver_common.replayed_can import can_interface, can_recorder, open_can
 from icotronic_driver.commands import ACCELERATION_DATA
 from icotronic_driver.identifier import SPU_1, Identifier, node_name, receiver_filter
 from icotronic_driver.request import Request
@@ -69,14 +69,14 @@ class Line:
             SettingError: An option has no "=".
         """
         parse_options(options)  # a wrong one is told now, and not at every attempt to open
-        self.recorder = FlightRecorder()
+        self.recorder = can_recorder(interface, channel)
         self.counts = LineCounts()
         self.on_stream: StreamHandler | None = None
-        self._make_link = partial(CanLink, interface, channel, bitrate, options, FILTERS,
+        self._make_link = partial(open_can, interface, channel, bitrate, options, FILTERS,
                                   self.recorder)
         self._link: CanLink | None = None
         self._interrupted = threading.Event()
-        self.interface = interface
+        self.interface = can_interface(interface, self.recorder)
         self.name = f"{interface} {channel}"
 
     def open(self) -> None:
@@ -113,6 +113,11 @@ class Line:
             return ""
         return advice.SMALL_BUFFER.text(size=size // 1024, wanted=RECEIVE_BUFFER)
 
+    @property
+    def arrival_time(self) -> int:
+        """The host's time in ns when something arrived last."""
+        return self.link.arrived + self.recorder.offset
+
     def listen(self, duration: float, may_wait: float = 0.0) -> None:
         """Receive for some s and hand over what arrives; raises LinkError.
 
@@ -121,18 +126,15 @@ class Line:
             may_wait: Time in s for which frames may wait for others: waking up for each of them
                 costs more than to receive it.
         """
-        link, handle = self.link, self.on_stream
-        receive, monotonic = link.receive, time.monotonic_ns
-        now = monotonic()
-        end = now + int(duration * 1e9)
+        link, handle, now = self.link, self.on_stream, self.recorder.now()
+        receive, end = link.receive, now + int(duration * 1e9)
         try:
             while now < end:
                 message = receive(0.0 if may_wait else (end - now) * 1e-9)
+                now = link.arrived
                 if message is None:
                     time.sleep(may_wait)
-                    now = monotonic()
                     continue
-                now = monotonic()
                 if message.arbitration_id == STREAM_ID and handle and message.is_extended_id:
                     handle(message.data, message.timestamp, now)
                 else:
@@ -168,7 +170,7 @@ class Line:
                     message := link.receive(max(0.0, end - time.monotonic()))) is not None):
                 streamed = message.arbitration_id == STREAM_ID and message.is_extended_id
                 if streamed and self.on_stream:
-                    self.on_stream(message.data, message.timestamp, time.monotonic_ns())
+                    self.on_stream(message.data, message.timestamp, link.arrived)
                 if (message.is_extended_id and not message.is_error_frame
                         and request.is_answered_by(message.arbitration_id, message.data)):
                     return request.result(message.arbitration_id, message.data)
@@ -181,8 +183,8 @@ class Line:
 
     def _open_again_if_silent(self) -> None:
         """Open a bus elsewhere again that has been silent: its server may be gone unnoticed."""
-        silence = time.monotonic_ns() - self.link.heard
-        if self.interface in NETWORK and silence > SILENCE * 1e9:
+        silence = time.monotonic() - self.link.heard * 1e-9
+        if self.interface in NETWORK and silence > SILENCE:
             self.close()
             self.open()
 

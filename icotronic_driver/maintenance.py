@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-import time
 from collections.abc import Callable, Mapping
 from typing import TypeVar
 
+from driver_common import clocks as time
 from driver_common.errors import (
     DriverError,
     FrameError,

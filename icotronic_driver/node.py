@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -17,6 +16,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from sensor_msgs.msg import BatteryState, Imu, PointCloud2, Temperature
 from std_msgs.msg import Float64, Float64MultiArray
 
+from driver_common import clocks as time
 from driver_common import diagnostics
 from driver_common.device_node import FRAME_ID, TIME_OFFSET, DeviceNode, Topic, run
 from driver_common.recording import CAN
@@ -81,8 +81,9 @@ class IcotronicNode(DeviceNode, Listener):
     BUS_OPTIONS = (
         Option("can_interface", kind=str, default="socketcan",
                description="Interface of python-can, such as socketcan or socketcand; sim = a "
-                           "simulated sensor"),
-        Option("can_channel", kind=str, default="can0", description="Channel of the interface"),
+                           "simulated sensor; replay = a recording"),
+        Option("can_channel", kind=str, default="can0",
+               description="Channel of the interface; the file of a recording"),
         Option("can_bitrate", kind=int, default=1_000_000, minimum=1, unit="bit/s",
                description="Bit rate of the bus"),
         Option("can_options", kind=list, default=[],
@@ -247,6 +248,10 @@ class IcotronicNode(DeviceNode, Listener):
         """Return the name of the CAN channel."""
         return str(self.option("can_channel"))
 
+    def link_facts(self) -> dict[str, str]:
+        """Return the interface, whose times differ."""
+        return {"interface": self.bus.line.interface}
+
     # --- what the bus reports, in its thread ---
 
     def describe(self, sensor: Sensor) -> str:
@@ -360,7 +365,7 @@ class IcotronicNode(DeviceNode, Listener):
         convert = {"battery_voltage": to_battery_state, "temperature": to_temperature}.get(name)
         if convert is not None:
             self.while_running(self._topics[name].publish)(
-                convert(value, self.option("frame_id"), time.time_ns()))
+                convert(value, self.option("frame_id"), self.bus.line.arrival_time))
 
     # --- services, in the executor ---
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from typing import TypeVar
 
+from driver_common import clocks as time
 from driver_common.errors import FrameError, NoAnswerError, RefusedError
 from driver_common.settings import Raw, Record, RecordAccess
 from isys_radar_driver import commands

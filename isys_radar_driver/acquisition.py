@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import math
-import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from driver_common import clocks as time
 from driver_common.errors import FrameError, RefusedError
 from driver_common.settings import Value
 from isys_radar_driver import commands
@@ -120,7 +120,8 @@ class Acquisition:
             radar.statistics.implausible_lists += 1
             return
         missed = radar.count_list(begin, clipping=targets.clipping, shared=len(self._radars) > 1)
-        listener.on_target_list(radar, targets, radar.time_in_cycle(stamp))
+        listener.on_target_list(radar, targets, radar.time_in_cycle(
+            stamp, self._access.line.recorder.offset))
         if options.read_range_list and model.supports(commands.READ_RANGE_LIST):
             range_list, stamp = self._access.timed(radar, commands.READ_RANGE_LIST, timeout)
             if radar.limits().allow_range(range_list.range):

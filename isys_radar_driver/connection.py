@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
 from driver_common import advice
+from driver_common import clocks as time
 from driver_common.device import Note
 from driver_common.errors import (
     DriverError,

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from typing import TypeVar
 
+from driver_common import clocks as time
 from driver_common.errors import FrameError, LinkError, NoAnswerError, RefusedError
-from driver_common.flight_recorder import FlightRecorder
+from driver_common.replayed_serial import open_serial, serial_recorder
 from driver_common.serial_link import SerialLink
 from isys_radar_driver.commands import READ_DEVICE_NAME
 from isys_radar_driver.frames import (
@@ -51,7 +51,7 @@ class Line:
     def __init__(self, port: str) -> None:
         """Prepare the line; nothing is opened."""
         self.port = port
-        self.recorder = FlightRecorder()
+        self.recorder = serial_recorder(port)
         self.parser = FrameParser()
         self.stale_frames = 0
         self.reply_began = 0
@@ -62,7 +62,7 @@ class Line:
 
     def open(self, baud_rate: int) -> None:
         """Open the port; raises LinkError."""
-        self._link = SerialLink(self.port, baud_rate, self.recorder)
+        self._link = open_serial(self.port, baud_rate, self.recorder)
 
     def close(self) -> None:
         """Close the port."""
@@ -213,7 +213,7 @@ class Line:
         dropped, self.reply_began = parser.dropped_bytes, 0
         while data := link.read(min(deadline, end) - time.monotonic()):
             if not parser.pending:
-                self.reply_began = time.time_ns() - round(link.seconds(len(data)) * 1e9)
+                self.reply_began = link.time - round(link.seconds(len(data)) * 1e9)
             for frame in parser.feed(data):
                 yield frame, self.reply_began
             now = time.monotonic()

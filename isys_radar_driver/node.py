@@ -61,7 +61,8 @@ class IsysRadarNode(DeviceNode, Listener):
     KIND = Radar.KIND
     BUS_OPTIONS = (
         Option("serial_port", kind=str, default="",
-               description="Device path, pyserial URL such as socket://host:port, or sim://MODEL"),
+               description="Device path, pyserial URL such as socket://host:port, sim://MODEL, or "
+                           "replay://FILE"),
         Option("serial_baud", kind=int, default=0, minimum=0, unit="Bd",
                description="Baud rate; 0 = the default rates of the models, one after the other"),
     )

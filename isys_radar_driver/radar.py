@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-import time
 from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from driver_common import clocks as time
 from driver_common.cycle_clock import CycleClock
 from driver_common.device import Device, DeviceOptions
 from driver_common.errors import NoAnswerError
-from driver_common.sample_clock import HostClock
 from driver_common.serial_link import BITS_PER_BYTE
 from driver_common.settings import RecordAccess, Value, read_settings
 from isys_radar_driver.commands import Version
@@ -177,14 +176,13 @@ class Radar(Device):
         self.clippings.clear()
         self.cycles = None
 
-    def time_in_cycle(self, arrival: int) -> int:
+    def time_in_cycle(self, arrival: int, offset: int) -> int:
         """Return when a cycle ended, without the jitter of the target list's arrival.
 
-        Both are times of the host in ns.
+        Both are times of the host in ns; `offset` is that of its time of day to its monotonic one.
         """
         if self.cycles is None:
             self.cycles = CycleClock(self.cycle_time)
-        offset = HostClock().offset
         return self.cycles.stamp(arrival - offset) + offset
 
     def write(self, access: RecordAccess, changes: Mapping[str, Value]) -> dict[str, Value]:

@@ -7,9 +7,9 @@ one thread (see `driver_common.device_thread`).
 from __future__ import annotations
 
 import contextlib
-import time
 from collections.abc import Iterable, Mapping
 
+from driver_common import clocks as time
 from driver_common import device_bus
 from driver_common.device_bus import DeviceBus
 from driver_common.errors import (

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 
+from driver_common import clocks as time
 from driver_common import device_bus
 from driver_common.device_thread import Backoff
 from driver_common.errors import FrameError, NoAnswerError, RefusedError, SettingError

@@ -8,10 +8,10 @@ seen empty at the time at which it had to be there.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Sequence
 from typing import Any, Protocol
 
+from driver_common import clocks as time
 from uc4000_driver.commands import CYCLE_TIME, Command
 from uc4000_driver.telegram import (
     BYTE_TIME,
@@ -55,8 +55,8 @@ class Wire(Protocol):
     def read(self, timeout: float, until: float) -> bytes:
         """Return what arrives within `timeout` s, in a wait that may last until a time."""
 
-    def write(self, data: bytes) -> None:
-        """Send bytes."""
+    def write(self, data: bytes) -> int:
+        """Send bytes, and return the host's time in ns when that began."""
 
 
 class Exchange:
@@ -107,10 +107,10 @@ class Exchange:
         for request in requests:
             while (remaining := due - time.monotonic()) > 0:
                 self.parser.feed(self._wire.read(remaining, due), time.monotonic())
-            begun, begun_ns = time.monotonic(), time.time_ns()
+            begun = time.monotonic()
             if self._ends and begun + REQUEST_TIME + GAP > self._ends[0]:
                 break
-            self._wire.write(request)
+            begun_ns = self._wire.write(request)
             self.parser.sent(request)
             self.sent.append(begun_ns + round(REQUEST_TIME * 1e9))
             self._ends.append(begun + REQUEST_TIME + self._duration)

@@ -6,12 +6,12 @@ One request at a time; only `ask_together` has several sensors measure at the sa
 from __future__ import annotations
 
 import contextlib
-import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from driver_common import advice
+from driver_common import clocks as time
 from driver_common.errors import (
     DriverError,
     FrameError,
@@ -20,7 +20,7 @@ from driver_common.errors import (
     RefusedError,
     SettingError,
 )
-from driver_common.flight_recorder import FlightRecorder
+from driver_common.replayed_serial import open_serial, serial_recorder
 from driver_common.serial_link import SerialLink
 from uc4000_driver.commands import READ_SERIAL_NUMBER, READ_VERSION, Command, Distance
 from uc4000_driver.exchange import NOISE_TIME, Exchange
@@ -107,7 +107,7 @@ class Line:
     def __init__(self, port: str, local_echo: str = "auto") -> None:
         """Prepare the line; nothing is opened."""
         self.port = port
-        self.recorder = FlightRecorder()
+        self.recorder = serial_recorder(port)
         self.local_echo = local_echo
         self.echo: bool | None = None
         self.stray_bytes = 0
@@ -120,7 +120,7 @@ class Line:
 
     def open(self) -> None:
         """Open the port; raises LinkError."""
-        self._link = SerialLink(self.port, BAUD_RATE, self.recorder)
+        self._link = open_serial(self.port, BAUD_RATE, self.recorder)
         self.echo = None
         self._late = {SHORT_REPLY}  # to what another program asked just now
 
@@ -142,9 +142,10 @@ class Line:
             raise LinkError(f"{self.port} is not open")
         return self._link
 
-    def write(self, data: bytes) -> None:
-        """Send bytes; raises LinkError."""
+    def write(self, data: bytes) -> int:
+        """Send bytes, and return the host's time in ns when that began; raises LinkError."""
         self.link.write(data)
+        return self.link.time
 
     def read(self, timeout: float, until: float) -> bytes:
         """Return what arrives within `timeout` s, at most a slice of a long wait.

@@ -43,7 +43,8 @@ class Uc4000Node(DeviceNode, Listener):
 
     BUS_OPTIONS = (
         Option("serial_port", kind=str, default="",
-               description="Device path, pyserial URL such as socket://host:port, or sim://UC4000"),
+               description="Device path, pyserial URL such as socket://host:port, sim://UC4000, or "
+                           "replay://FILE"),
         Option("local_echo", kind=str, choices=_words(*ECHO_CHOICES), default="auto", live=True,
                description="Whether the line returns what is sent, as a single LIN wire does; "
                            "auto = find out"),

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import time
 from collections import Counter, deque
 from dataclasses import dataclass, field
 
+from driver_common import clocks as time
 from driver_common.device import Device, DeviceOptions
 from driver_common.settings import Raw
 from uc4000_driver.commands import PROFILES, Distance, Outcome, Profile

@@ -5,9 +5,9 @@ All of `Uc4000Bus` runs in one thread (see `driver_common.device_thread`), but f
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterable, Mapping
 
+from driver_common import clocks as time
 from driver_common.device_bus import DeviceBus
 from driver_common.errors import DriverError, FrameError, NoAnswerError, RefusedError, SettingError
 from driver_common.settings import Value

@@ -85,7 +85,7 @@ class Bench:
 class VirtualLink:
     """In place of `SerialLink`: a port with simulated devices, where every wait is over at once."""
 
-    MODULES = ("isys_radar_driver.line", "uc4000_driver.line", "sensor_tools.doctor.serial_port")
+    MODULES = ("driver_common.replayed_serial", "sensor_tools.doctor.serial_port")
     PORT = "/dev/ttyVirtual"
     has_low_latency = False
 

@@ -2,17 +2,23 @@
 
 import math
 import sys
+from types import SimpleNamespace
 
 from driver_common import diagnostics
 from driver_common.device import Device, DeviceOptions
 from driver_common.device_bus import DeviceBus, Listener
 from driver_common.device_node import DeviceNode, run
+from driver_common.flight_recorder import FlightRecorder
 
 
 class HangingBus(DeviceBus):
     """A bus of which the first step ends when a line comes from the standard input."""
 
     told = ""
+
+    def __init__(self, *arguments):
+        super().__init__(*arguments)
+        self.line = SimpleNamespace(recorder=FlightRecorder())
 
     def _open_link(self):
         pass

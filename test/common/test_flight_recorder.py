@@ -182,6 +182,7 @@ def frame(time, kind, identifier=0x14C00DC1 | EXTENDED, data=b"\x80\x01", bus_ti
 CAN_ENTRIES = [
     frame(5 * SECOND + 123, Kind.SENT, bus_time=0.0),
     frame(5 * SECOND + 456, Kind.RECEIVED, bus_time=1764098078.123456),
+    frame(5 * SECOND + 457, Kind.RECEIVED, bus_time=1764098078.123456 + 3e-7),  # of a kernel
     frame(5 * SECOND + 457, Kind.RECEIVED, bus_time=12.5),  # since the adapter was plugged in
     Entry(5 * SECOND + 500, Kind.NOTHING),
     frame(6 * SECOND, Kind.RECEIVED, 0x123, b""),
@@ -232,9 +233,10 @@ def test_the_text_of_a_serial_line_is_as_documented():
 
 
 def test_the_frames_of_a_can_bus_are_as_candump_writes_them():
-    frames = [line for line in text_of(CAN, CAN_ENTRIES[:7]).splitlines() if line[0] == "("]
+    frames = [line for line in text_of(CAN, CAN_ENTRIES[:8]).splitlines() if line[0] == "("]
     assert frames == [
         "(1764098078.123456) can0 14C00DC1#8001 T",
+        "(1764098078.123456) can0 14C00DC1#8001 R",
         "(1764098078.123456) can0 14C00DC1#8001 R",
         "(12.500000) can0 14C00DC1#8001 R",
         "(1.250000) can0 123# R",

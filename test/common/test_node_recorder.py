@@ -1,4 +1,4 @@
-"""Recordings of nodes: on request, at an outage, or of all."""
+"""Recordings of nodes: on request, at an outage, or of all; and nodes that play them."""
 
 from __future__ import annotations
 
@@ -156,3 +156,81 @@ def test_a_directory_that_cannot_be_written_is_told_once(ros, tmp_path):
     assert len(lines) == 2  # once of its own accord, once as the answer
 
 
+
+
+# --- replay ------------------------------------------------------------------------------------
+
+def play(driver, path):
+    """Return the parameters with which a driver plays a recording."""
+    if driver.link == CAN:
+        return {"can_interface": "replay", "can_channel": str(path)}
+    return {"serial_port": f"replay://{path}"}
+
+
+def run(ros, driver, parameters, name, until):
+    """Run a node from its start on, until something; return what it published, and its log."""
+    with NodeProcess(driver.module, parameters | {"autostart": False},
+                     "-r", f"__node:={name}") as process:
+        node = ros.remote(f"/{name}")
+        messages = node.subscribe(driver.kind, driver.topic)
+        assert node.change_state("configure")
+        ros.wait_until(lambda: ros.node.count_publishers(f"/{name}/{driver.topic}"))
+        assert node.change_state("activate")
+        until(process, node, messages)
+        process.stop()
+    messages = list(messages)
+    ros.forget()
+    return messages, process
+
+
+@pytest.mark.parametrize("driver", DRIVERS, ids=lambda driver: driver.name)
+def test_a_recording_gives_the_same_messages(ros, home, driver):
+    counts = []
+
+    def save(process, node, messages):
+        ros.wait_until(lambda: len(messages) > 60)
+        counts.append(len(messages))
+        assert node.trigger("save_recording").success
+
+    def end(process, node, messages):
+        ros.wait_until(lambda: "has ended" in process.log)
+        ros.wait(lambda: len(messages) >= counts[0], 2.0)
+
+    wanted, _ = run(ros, driver, driver.parameters | {"time_offset": -0.01}, "original", save)
+    (path,) = logs(home, "request")
+    replayed, process = run(ros, driver, play(driver, path) | {"replay_rate": 4.0}, "again", end)
+    assert len(replayed) >= counts[0] - 2  # the last ones of a batch were not in it yet
+    assert replayed == wanted[:len(replayed)]
+    assert f"playing {path} of /original" in process.log
+    assert "this node asks" not in process.log
+
+
+def test_other_parameters_than_recorded_are_said_once(ros, home):
+    driver = DRIVERS[0]
+
+    def save(process, node, messages):
+        ros.wait_until(lambda: len(messages) > 10)
+        node.trigger("save_recording")
+
+    def end(process, node, messages):
+        process.wait_for_line("has ended")
+
+    run(ros, driver, driver.parameters, "original", save)
+    (path,) = logs(home, "request")
+    _, process = run(ros, driver, play(driver, path) | {
+        "output": 2, "replay_rate": 100.0}, "again", end)
+    assert process.log.count("this node asks") == 1
+
+
+@pytest.mark.parametrize("driver", DRIVERS, ids=lambda driver: driver.name)
+@pytest.mark.parametrize(("text", "fault"), [
+    ("hello", "it is no recording of this package"),
+    ("# industrial_sensor_drivers recording, format 1, {link}\n# node: /x\n", "it is cut off")])
+def test_a_file_that_cannot_be_played_is_one_line(tmp_path, driver, text, fault):
+    path = tmp_path / "file.log"
+    path.write_text(text.format(link=driver.link))
+    with NodeProcess(driver.module, play(driver, path)) as process:
+        assert process.wait() == 1
+    (line,) = [line for line in process.lines if line]
+    assert fault in line
+    assert f"cannot replay {path}: " in line

@@ -16,14 +16,6 @@ EPOCH = 1_800_000_000_000_000_000 - START  # ns from there to the time of day
 PATH = 1_000_000  # ns
 
 
-class FixedClock(HostClock):
-    """The clock of a host on which nothing else happens."""
-
-    @staticmethod
-    def _read():
-        return EPOCH
-
-
 class Receiver:
     """Receives a stream whose frames hold their number."""
 
@@ -31,7 +23,7 @@ class Receiver:
         self.decoder = StreamDecoder(StreamFormat((True, False, False), 3), RATE / 3)
         self.clock = SampleClock(RATE, waits=True)
         self.numbers, self.stamps = [], []
-        self.reception = Reception(self.decoder, self.clock, FixedClock(), self.take,
+        self.reception = Reception(self.decoder, self.clock, HostClock(lambda: EPOCH), self.take,
                                    kernel_stamps=kernel_stamps)
         self.handle = self.reception.handler()
 

@@ -67,6 +67,10 @@ class VirtualLink:
         self._arrived = bytearray()
         self._free = 0.0
 
+    @property
+    def time(self):
+        return self.clock.time_ns()
+
     def seconds(self, length):
         return length * BITS_PER_BYTE / self.baud_rate
 
@@ -115,7 +119,7 @@ class VirtualMaster(Master):
         self.link = link
         for module in MODULES:
             monkeypatch.setattr(module, "time", link.clock)
-        monkeypatch.setattr(line, "SerialLink", lambda *_: link)
+        monkeypatch.setattr(line, "open_serial", lambda *_: link)
         super().__init__("virtual", *options, baud_rate=link.baud_rate)
         self.find()
 
