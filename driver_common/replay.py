@@ -3,13 +3,13 @@
 Each read gets what the read in its place got, each write is what the node wrote then. So the driver
 does the same, and time is what it was. Where it does something else, because its parameters or its
 version are others, the replay goes on where it fits again: a request that was not made about then
-gets the answer of another time, or none, but never one to something else.
+gets the answer that it got at all other times, or none, but never one to something else.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from driver_common import clocks
@@ -161,7 +161,11 @@ class Replay(FlightRecorder):
         return None
 
     def _note_difference(self, content: bytes) -> None:
-        """Take note of a request that was not made then; the answer of another time has to do."""
+        """Take note of a request that was not made then.
+
+        Where it always got the same answer, that one will do; what was measured at another time
+        will not.
+        """
         if not self.differs and self._next < len(self._entries):
             identifier, data = frame_of(content)[1:] if self._is_can else (0, content)
             what = f"{identifier & ~EXTENDED:08X}#" if self._is_can else ""
@@ -169,16 +173,25 @@ class Replay(FlightRecorder):
         if self._is_can:  # its frames come all the time
             return
         self._silent = True
-        place = next((place for place, entry in enumerate(self._entries)
-                      if entry.kind is Kind.SENT and entry.content == content), None)
         self._borrowed.clear()
-        if place is not None:
-            later = self.clock.now - self._entries[place].time
-            for entry in self._entries[place + 1:]:
-                if entry.kind in (Kind.SENT, Kind.LOST, Kind.GAP):
-                    break
-                if entry.kind is Kind.RECEIVED:
-                    self._borrowed.append(entry._replace(time=entry.time + later))
+        answers = [answer for answer in self._answers(content) if len(answer) > 1]
+        if len({b"".join(entry.content for entry in rest) for _, *rest in answers}) == 1:
+            request, *rest = answers[0]
+            later = self.clock.now - request.time
+            self._borrowed += [entry._replace(time=entry.time + later) for entry in rest]
+
+    def _answers(self, content: bytes) -> Iterator[list[Entry]]:
+        """Return each place where a request was made: the request, and what came then."""
+        found: list[Entry] = []
+        for entry in self._entries:
+            if entry.kind in (Kind.SENT, Kind.LOST, Kind.GAP):
+                if found:
+                    yield found
+                found = [entry] if entry.kind is Kind.SENT and entry.content == content else []
+            elif found and entry.kind is Kind.RECEIVED:
+                found.append(entry)
+        if found:
+            yield found
 
     def _borrow(self, end: int) -> Entry | None:
         """Return what belongs to the answer of another time, None where nothing does until then."""

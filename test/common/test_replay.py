@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import pytest
 
-from driver_common import clocks, device_bus
+from driver_common import clocks, device_bus, flight_recorder
 from driver_common.device_thread import DeviceThread
 from driver_common.errors import LinkError, SettingError
 from driver_common.flight_recorder import (
@@ -264,6 +264,14 @@ def test_a_request_that_was_not_made_then_gets_the_answer_of_another_time(serial
     assert recorder.differs == "02"
 
 
+def test_what_was_measured_at_another_time_is_no_answer(serial):
+    link, recorder = serial(at(1, Kind.OPENED), *exchange(2, ONE, A), *exchange(30, TWO, A),
+                            *exchange(31, TWO, B))
+    assert ask(link, ONE) == A
+    assert ask(link, TWO) == b""
+    assert recorder.differs == "02"
+
+
 def test_a_request_that_was_never_made_gets_no_answer(serial):
     link, recorder = serial(at(1, Kind.OPENED), *exchange(2, ONE, A), *exchange(3, TWO, B))
     assert ask(link, OTHER) == b""
@@ -373,3 +381,27 @@ def test_a_recording_of_another_link_is_refused(tmp_path, link, recorder):
     path.write_text(f"# industrial_sensor_drivers recording, format 1, {link}\n# end 0\n")
     with pytest.raises(SettingError, match=f"^cannot replay {path}: it is of a {link} link, not"):
         recorder(path)
+
+
+def test_what_came_after_a_gap_is_the_same(tmp_path, monkeypatch):
+    monkeypatch.setattr(flight_recorder, "DURATION", 0.5)
+    monkeypatch.setattr(flight_recorder, "START_TIME", 0.1)
+    monkeypatch.setattr(flight_recorder, "CHUNK_TIME", 0.1)
+
+    class Found(HeardUltrasonic):
+        def on_found(self, device):
+            super().on_found(device)
+            self.recorder.keep_search()
+
+    driver = DRIVERS["ultrasonic"]._replace(heard=Found, enough=60)
+    simulator = driver.simulate()
+    heard, bus = play(driver, simulator.port)
+    simulator.close()
+    recorder = bus.line.recorder
+    parts, _ = recorder.snapshot()
+    assert any(entry.kind is Kind.GAP for entry in unpack(parts))
+    url = write(tmp_path / "recording.log", driver.link, recorder)
+    again, _ = play(driver._replace(enough=10**9), url, rate=0.0)
+    assert again.error.endswith("has ended")
+    assert len(again.told) > 5
+    assert [told for told in again.told if told not in heard.told] == []
