@@ -38,7 +38,7 @@ class RecordingFiles:
         self.limit = limit
         self._owner = re.sub("[^A-Za-z0-9_]+", ".", owner).strip(".")[:100] or "node"
         self._pattern = re.compile(
-            re.escape(self._owner) + rf"-\d{{8}}T\d{{9}}Z-[a-z]+\.log({re.escape(PART)})?")
+            re.escape(self._owner) + rf"-\d{{8}}T\d{{12}}Z-[a-z]+\.log({re.escape(PART)})?")
 
     def create(self, reason: str) -> RecordingFile:
         """Begin a recording, after the oldest ones were deleted where they take too much.
@@ -82,8 +82,7 @@ class RecordingFile:
         self._where = where
         self._limit = limit
         self._size = 0
-        moment = datetime.now(timezone.utc)
-        self._name = f"{owner}-{moment:%Y%m%dT%H%M%S}{moment.microsecond // 1000:03d}Z-{reason}.log"
+        self._name = f"{owner}-{datetime.now(timezone.utc):%Y%m%dT%H%M%S%f}Z-{reason}.log"
         self.path = directory / self._name
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
         try:

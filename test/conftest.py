@@ -5,6 +5,7 @@ import functools
 import os
 import pathlib
 import shutil
+import signal
 import tempfile
 
 import pytest
@@ -23,6 +24,9 @@ LEASE = """<?xml version="1.0" encoding="UTF-8"?>
   </participant>
 </profiles>
 """
+
+# A shell has programs in the background ignore it, and so would all that the tests start.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 log_directory = tempfile.mkdtemp(prefix="ros-log-")
 atexit.register(shutil.rmtree, log_directory, ignore_errors=True)

@@ -37,7 +37,7 @@ def files(tmp_path):
 def test_a_recording_is_written_into_a_directory_that_is_made(files):
     path = save_one(files)
     assert path.parent == files.directory
-    assert re.fullmatch(r"left\.isys_radar-\d{8}T\d{9}Z-outage\.log", path.name)
+    assert re.fullmatch(r"left\.isys_radar-\d{8}T\d{12}Z-outage\.log", path.name)
     assert names(files.directory) == [path.name]
     assert read_recording(path).entries == ENTRIES
 
@@ -97,7 +97,7 @@ def test_a_single_recording_says_when_it_is_full(files):
 
 def test_files_of_others_are_never_deleted(files):
     files.directory.mkdir(parents=True)
-    stem = "20260101T000000000Z-raw.log"
+    stem = "20260101T000000000000Z-raw.log"
     others = ["notes.txt", "left.isys_radar-notes.log", f"left.isys_radar2-{stem}",
               f"xleft.isys_radar-{stem}", f"right.uc4000-{stem}"]
     for name in others:
@@ -120,13 +120,13 @@ def test_links_in_the_directory_are_not_followed(files, tmp_path, monkeypatch):
     precious = tmp_path / "precious"
     precious.write_text("x" * LIMIT)
     files.directory.mkdir(parents=True)
-    link = files.directory / "left.isys_radar-20200101T000000000Z-raw.log"
+    link = files.directory / "left.isys_radar-20200101T000000000000Z-raw.log"
     link.symlink_to(precious)
 
     real = recording_files.datetime
     monkeypatch.setattr(recording_files, "datetime", type("Fixed", (), {
         "now": staticmethod(lambda _: real.fromisoformat("2026-01-01T00:00:00+00:00"))}))
-    part = files.directory / "left.isys_radar-20260101T000000000Z-outage.log.part"
+    part = files.directory / "left.isys_radar-20260101T000000000000Z-outage.log.part"
     part.symlink_to(precious)
     with pytest.raises(DriverError, match="File exists"):
         save_one(files)
