@@ -5,6 +5,7 @@ What gets lost then was lost here, and not on the way.
 
 from __future__ import annotations
 
+import math
 import time
 
 NOTEWORTHY = 0.25  # s beyond what a step should take
@@ -13,7 +14,7 @@ CLOCK = getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC)  # goes on while t
 
 
 class HostPauses:
-    """Notices pauses, by steps that take longer than they should.
+    """Notices pauses of a thread that says before each wait how long that takes at most.
 
     Attributes:
         count: How many there were.
@@ -22,30 +23,34 @@ class HostPauses:
     """
 
     def __init__(self) -> None:
-        """Begin with none."""
+        """Begin with none, at rest."""
         self.count = 0
         self.longest = 0.0
         self.lost = 0
-        self._begin = 0.0
-        self._until = 0.0
+        self._due = math.inf
+        self._caught_up = 0.0
 
-    def begin(self) -> None:
-        """Begin a step."""
-        self._begin = time.clock_gettime(CLOCK)
+    def watch(self) -> None:
+        """Look for pauses from now on."""
+        self._due = time.clock_gettime(CLOCK)
 
-    def end(self, expected: float, lost: int) -> None:
-        """End a step.
+    def rest(self) -> None:
+        """Look for none until `watch`: the thread may wait for as long as it likes."""
+        self._due = math.inf
 
-        Args:
-            expected: How long it should take at most, in s.
-            lost: Frames that were found to be lost in it; in or soon after a pause they were lost
-                because of it.
-        """
+    def wait(self, seconds: float) -> None:
+        """Tell that this thread waits now, for some s at most, before it comes here again."""
+        if self._due == math.inf:
+            return
         now = time.clock_gettime(CLOCK)
-        pause = now - self._begin - expected
+        pause = now - self._due
         if pause > NOTEWORTHY:
             self.count += 1
             self.longest = max(self.longest, pause)
-            self._until = now + CATCH_UP + pause
-        if now < self._until:
-            self.lost += lost
+            self._caught_up = now + CATCH_UP + pause
+        self._due = now + seconds
+
+    def count_lost(self, frames: int) -> None:
+        """Count frames that were just found to be lost, if that was because of a pause."""
+        if time.clock_gettime(CLOCK) < self._caught_up:
+            self.lost += frames

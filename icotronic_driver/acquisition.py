@@ -56,6 +56,7 @@ class Acquisition:
         self._wanted = wanted
         self._last_frame = 0.0
         self._told_loss = False
+        self._counted = 0, 0  # frames that came and that were lost
         self._host_clock = HostClock(line.recorder.read_offset)
         self._reception: Reception | None = None
         self._told_rate = ""
@@ -198,7 +199,7 @@ class Acquisition:
         if self._sensor.decoder is not None:
             self._line.request(commands.STOP_ACCELERATION.request(STH_1))
             self._take_what_is_on_the_way()
-            self._end_stream()
+            self.end_stream()
 
     def _start(self) -> None:
         sensor = self._sensor
@@ -210,22 +211,24 @@ class Acquisition:
             kernel_stamps=self._line.interface == "socketcan")
         self._line.on_stream = self._reception.handler()
         self._last_frame, self._told_loss = time.monotonic(), False
+        self._counted = 0, 0
+        self._line.pauses.watch()
         self._pace_since, self._deviation = (self._last_frame, 0), 0.0
         self._told_pace = False
         try:
             self._line.request(commands.START_ACCELERATION.request(STH_1, form),
                                self._longest_silence / 2)  # the first frame is the answer
         except DriverError:
-            self._end_stream()
+            self.end_stream()
             raise
 
     def _receive(self, decoder: StreamDecoder) -> None:
         """Receive for a moment; look after a stream that fell silent."""
-        frames, lost = decoder.statistics.frames, decoder.statistics.lost
         self._host_clock.follow()
-        self._sensor.pauses.begin()
         self._line.listen(LISTEN_TIME, self._sensor.options.may_wait)
-        self._sensor.pauses.end(LISTEN_TIME, decoder.statistics.lost - lost)
+        frames, lost = self._counted
+        self._counted = decoder.statistics.frames, decoder.statistics.lost
+        self._line.pauses.count_lost(decoder.statistics.lost - lost)
         if decoder.statistics.lost and not self._told_loss:
             self._told_loss = True
             self._note(f"{decoder.statistics.lost} frames were lost on the radio; more are "
@@ -281,12 +284,14 @@ class Acquisition:
         """React to a stream that fell silent: start it again where the sensor is still there."""
         if not self._access.is_connected():
             raise NoAnswerError("the sensor was lost while it streamed")
-        self._end_stream()
+        self.end_stream()
         self._note("the stream fell silent; starting it again", warning=True)
         self.start_or_stop()
 
-    def _end_stream(self) -> None:
+    def end_stream(self) -> None:
+        """Take no more of the stream, if there is one, but what was received of it."""
         self._line.on_stream = None
+        self._line.pauses.rest()
         if self._reception is not None:
             self._reception.finish()
             self._reception = None

@@ -15,6 +15,7 @@ from driver_common import advice
 from driver_common import clocks as time
 from driver_common.can_link import RECEIVE_BUFFER, CanLink, parse_options
 from driver_common.errors import FrameError, LinkError, NoAnswerError
+from driver_common.host_pauses import HostPauses
 from driver_common.replayed_can import can_interface, can_recorder, open_can
 from icotronic_driver.commands import ACCELERATION_DATA
 from icotronic_driver.identifier import SPU_1, Identifier, node_name, receiver_filter
@@ -58,6 +59,7 @@ class Line:
     Attributes:
         recorder: Has what passed of late.
         counts: What was counted.
+        pauses: Those of this host, while a stream comes.
         on_stream: Takes the data of each frame of the acceleration stream, when it was on the bus
             in s of the interface's clock, and its arrival in monotonic ns.
     """
@@ -71,6 +73,7 @@ class Line:
         parse_options(options)  # a wrong one is told now, and not at every attempt to open
         self.recorder = can_recorder(interface, channel)
         self.counts = LineCounts()
+        self.pauses = HostPauses()
         self.on_stream: StreamHandler | None = None
         self._make_link = partial(open_can, interface, channel, bitrate, options, FILTERS,
                                   self.recorder)
@@ -127,6 +130,7 @@ class Line:
                 costs more than to receive it.
         """
         link, handle, now = self.link, self.on_stream, self.recorder.now()
+        self.pauses.wait(duration)
         receive, end = link.receive, now + int(duration * 1e9)
         try:
             while now < end:
@@ -162,6 +166,7 @@ class Line:
     def _attempt(self, request: Request[T], timeout: float) -> T:
         self._open_again_if_silent()
         link = self.link
+        self.pauses.wait(timeout)
         link.send(request.frame.identifier.encode(), request.frame.data)
         end = time.monotonic() + timeout
         try:

@@ -413,7 +413,7 @@ class IcotronicNode(DeviceNode, Listener):
 
     def status_of(self, sensor: Sensor) -> DiagnosticStatus:
         """Return identity, link, rate, losses, calibration, readings and differing settings."""
-        counts, line = sensor.statistics, self.bus.line
+        counts, line, pauses = sensor.statistics, self.bus.line, self.bus.line.pauses
         values: dict[str, object] = {"bus": line.name, "phase": sensor.phase.value}
         for title, identity in (("sensor", sensor.identity), ("stationary unit",
                                                               sensor.stu_identity)):
@@ -435,9 +435,9 @@ class IcotronicNode(DeviceNode, Listener):
                    for name, value in vars(sensor.readings).items() if value is not None}
         values |= {
             "frames": counts.frames, "lost frames": counts.lost,
-            "frames lost in pauses of this host": sensor.pauses.lost,
-            "pauses of this host": sensor.pauses.count,
-            "longest pause of this host [s]": sensor.pauses.longest,
+            "frames lost in pauses of this host": pauses.lost,
+            "pauses of this host": pauses.count,
+            "longest pause of this host [s]": pauses.longest,
             "duplicate frames": counts.duplicates, "damaged frames": counts.damaged,
             "fault of the last damaged frame": counts.fault,
             "stale frames": line.counts.stale, "foreign frames": line.counts.foreign,
@@ -488,7 +488,7 @@ class IcotronicNode(DeviceNode, Listener):
     def _recent_counts(self, sensor: Sensor) -> _Counts:
         """Return what was counted in the last `RECENT_TIME` s."""
         counts, line = sensor.statistics, self.bus.line.counts
-        here = sensor.pauses.lost
+        here = self.bus.line.pauses.lost
         now = _Counts(time.monotonic(), counts.frames, counts.lost - here, here, line.foreign,
                       line.other_host, line.errors)
         self._history.append(now)

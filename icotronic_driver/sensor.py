@@ -7,7 +7,6 @@ from enum import Enum
 from typing import NamedTuple
 
 from driver_common.device import Device, DeviceOptions
-from driver_common.host_pauses import HostPauses
 from driver_common.sample_clock import SampleClock
 from icotronic_driver.laws import (
     DEVICE,
@@ -182,7 +181,6 @@ class Sensor(Device):
         decoder: Decodes the stream; None while there is none.
         clock: Gives the samples of the stream their times.
         totals: Statistics of the streams before the present one.
-        pauses: Pauses of this host while there was a stream.
         breaks: Breaks of their clocks.
         time_outs: How often it or the stationary unit did not answer.
     """
@@ -205,7 +203,6 @@ class Sensor(Device):
         self.decoder: StreamDecoder | None = None
         self.clock = SampleClock(1.0)
         self.totals = StreamStatistics()
-        self.pauses = HostPauses()
         self.breaks = 0
         self.time_outs = 0
 

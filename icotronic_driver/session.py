@@ -67,7 +67,7 @@ class IcotronicBus(DeviceBus[Sensor]):
         if self.line.is_open:
             with contextlib.suppress(DriverError):
                 self.maintenance.disconnect()
-        self.line.on_stream = None
+        self.acquisition.end_stream()
         self.sensor.forget()
         self.line.close()
 
@@ -101,13 +101,13 @@ class IcotronicBus(DeviceBus[Sensor]):
 
     def _lose(self, sensor: Sensor, error: DriverError) -> None:
         """Note that the sensor is not there; look for it more and more rarely."""
+        self.acquisition.end_stream()
         if sensor.phase in (Phase.GREETING, Phase.CONNECTED):
             with contextlib.suppress(DriverError):
                 self._connection.release()
         if sensor.phase is not Phase.SEARCHING:
             self._connection.begin()
         sensor.time_outs += isinstance(error, NoAnswerError)
-        self.line.on_stream = None
         super()._lose(sensor, error)
 
     def _gist(self, error: DriverError | None) -> str:

@@ -15,26 +15,49 @@ def clock(monkeypatch):
     return now
 
 
-def step(pauses, clock, seconds, lost=0):
-    pauses.begin()
-    clock[0] += seconds
-    pauses.end(0.05, lost)
-
-
-def test_steps_that_take_their_time_are_no_pauses(clock):
+@pytest.fixture
+def pauses(clock):
     pauses = HostPauses()
+    pauses.watch()
+    return pauses
+
+
+def step(pauses, clock, seconds, lost=0):
+    """A wait of at most 0.05 s; then it is found that something was lost, and the next begins."""
+    pauses.wait(0.05)
+    clock[0] += seconds
+    pauses.wait(0.0)
+    pauses.count_lost(lost)
+
+
+def test_steps_that_take_their_time_are_no_pauses(clock, pauses):
     for _ in range(10):
         step(pauses, clock, 0.2, lost=3)
     assert (pauses.count, pauses.longest, pauses.lost) == (0, 0.0, 0)
 
 
-def test_what_gets_lost_in_a_pause_and_in_its_backlog_was_lost_here(clock):
-    pauses = HostPauses()
+def test_what_gets_lost_in_a_pause_and_in_its_backlog_was_lost_here(clock, pauses):
     step(pauses, clock, 4.05, lost=1)
     step(pauses, clock, 0.6, lost=2)
     step(pauses, clock, 0.25, lost=4)
     assert (pauses.count, pauses.lost) == (2, 7)
     assert pauses.longest == pytest.approx(4.0)
-    clock[0] += CATCH_UP + 4.0
+    for _ in range(round((CATCH_UP + 4.0) / 0.05)):
+        step(pauses, clock, 0.05)
     step(pauses, clock, 0.05, lost=8)
     assert pauses.lost == 7
+
+
+def test_a_pause_between_two_waits_is_one(clock, pauses):
+    step(pauses, clock, 0.05)
+    clock[0] += 3.0
+    step(pauses, clock, 0.05)
+    assert (pauses.count, pauses.longest) == (1, pytest.approx(3.0))
+
+
+def test_nothing_is_a_pause_while_nobody_watches(clock, pauses):
+    pauses.rest()
+    step(pauses, clock, 60.0)
+    pauses.watch()
+    step(pauses, clock, 0.05)
+    assert pauses.count == 0
