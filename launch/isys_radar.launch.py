@@ -8,7 +8,7 @@
 
 """Start the driver of one or several iSYS radars."""
 
-from driver_common.launch_file import describe_driver
+from industrial_sensor_drivers.launch_file import describe_driver
 
 
 def generate_launch_description():

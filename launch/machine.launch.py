@@ -11,7 +11,7 @@
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 
-from driver_common.launch_file import include_driver
+from industrial_sensor_drivers.launch_file import include_driver
 
 
 def generate_launch_description():

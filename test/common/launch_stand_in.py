@@ -133,8 +133,9 @@ def install(monkeypatch):
         vars(module).update(content)
         monkeypatch.setitem(sys.modules, name, module)
     # Imported anew, and forgotten at the end.
-    monkeypatch.setitem(sys.modules, "driver_common.launch_file", ModuleType("launch_file"))
-    del sys.modules["driver_common.launch_file"]
+    name = "industrial_sensor_drivers.launch_file"
+    monkeypatch.setitem(sys.modules, name, ModuleType("launch_file"))
+    del sys.modules[name]
 
 
 def start(*entities, **arguments):

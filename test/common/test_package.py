@@ -171,6 +171,40 @@ def test_every_program_is_installed_where_ros2_run_looks(install):
     assert all(os.access(path, os.X_OK) for path in directory.iterdir())
 
 
+@pytest.fixture
+def among_others(start, install, tmp_path):
+    """Start an installed program where other packages have each of our names, and come first."""
+    for path in ROOT.glob("*/__init__.py"):
+        if path.parent.name != PACKAGE:
+            (tmp_path / path.parent.name).mkdir()
+            (tmp_path / path.parent.name / "__init__.py").write_text("raise SystemExit('not ours')")
+
+    def start_one(program, *arguments):
+        shell = ["sh", "-c", 'PYTHONPATH="$0:$PYTHONPATH" exec "$@"', tmp_path]
+        return start(*shell, install / PACKAGE / "lib" / PACKAGE / program, *arguments)
+
+    return start_one
+
+
+@pytest.mark.timeout(180)
+def test_programs_find_what_is_theirs(among_others, install):
+    tools = [name for name in installed_programs(install) if not name.endswith("_node")]
+    assert len(tools) > 5
+    for process in [among_others(name, "--help") for name in tools]:
+        printed, _ = process.communicate(timeout=DEADLINE)
+        assert process.returncode == 0, printed
+        assert "usage" in printed.lower()
+
+
+@pytest.mark.timeout(180)
+@pytest.mark.parametrize(("program", "parameter"), [
+    ("icotronic_node", "can_channel"), ("isys_radar_node", "serial_port"),
+    ("uc4000_node", "serial_port")])
+def test_nodes_find_what_is_theirs(among_others, program, parameter):
+    process = among_others(program, "--ros-args", "-p", f"{parameter}:=does_not_exist")
+    wait_for_line(process, "does_not_exist")
+
+
 @pytest.mark.timeout(180)
 def test_tests_are_not_installed(install):
     site_packages = next((install / PACKAGE / "lib").glob("python3*/site-packages"))
