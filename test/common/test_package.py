@@ -8,6 +8,7 @@
 
 """The package as its user gets it: built by colcon, found by ROS, started where it is installed."""
 
+import ast
 import importlib.metadata
 import os
 import shutil
@@ -143,6 +144,35 @@ def test_package_xml_and_setup_py_agree(sources):
         *(person.email for person in package.maintainers),
         package.description,
     ]
+
+
+KEYS = {"can": "python3-can", "catkin_pkg": "python3-catkin-pkg", "click": "python3-click",
+        "hypothesis": "python3-hypothesis", "numpy": "python3-numpy", "pytest": "python3-pytest",
+        "rich": "python3-rich", "scipy": "python3-scipy", "serial": "python3-serial",
+        "yaml": "python3-yaml"}  # of rosdep, for what is imported under another name
+
+
+def imported_when_collected(path):
+    """Return what a file imports outside of functions."""
+    nodes = ast.parse(path.read_text(encoding="utf-8")).body
+    return {
+        name.partition(".")[0]
+        for node in nodes if isinstance(node, (ast.Import, ast.ImportFrom))
+        for name in ([node.module] if isinstance(node, ast.ImportFrom)
+                     else [alias.name for alias in node.names])
+    }
+
+
+def test_rosdep_brings_what_tests_import_or_they_are_skipped():
+    # One module that is missing would keep "colcon test" from running any test.
+    package = parse_package(str(ROOT / "package.xml"))
+    promised = {each.name for each in package.exec_depends + package.test_depends}
+    files = [path for path in ROOT.glob("test/**/*.py") if path.name != "launch_stand_in.py"]
+    ours = {path.stem for path in files} | {path.parent.name for path in ROOT.glob("*/__init__.py")}
+    assert len(files) > 50
+    for path in files:
+        for name in imported_when_collected(path) - ours - sys.stdlib_module_names:
+            assert KEYS.get(name, name) in promised, f"{path} imports {name}"
 
 
 def test_colcon_takes_it_for_a_ros_package(sources, colcon):

@@ -701,7 +701,9 @@ def _talk(server: SimulatedIcotronic, words: bytes, wanted: bytes) -> bytes:
     (b"", b"< hi >"), (b"< open can0 >", b"< ok >"), (b"< echo >", b"< echo >"),
     (b"< open can0 >< rawmode >", b"< ok >< ok >"), (b"< dance >", b"< error unknown command >"),
     (b"\xff\x00 garbage > < echo >", b"< echo >"), (b"< < open can0 >", b"< ok >"),
-    (b"x" * 100000 + b"< echo >", b"< echo >"), (b"<><  >< echo >", b"< echo >"),
+    # Named, because colcon stops to read, and the tests stop with it, at a line of 64 KiB.
+    pytest.param(b"x" * 100000 + b"< echo >", b"< echo >", id="noise"),
+    (b"<><  >< echo >", b"< echo >"),
     (b"< open can0 >< rawmode >< send 123 9 1 >", b"< error unknown command >"),
     (b"< open can0 >< rawmode >< send xyz 1 1 >", b"< error unknown command >"),
     (b"< open can0 >< rawmode >< send FFFFFFFF 0  >", b"< error unknown command >"),
