@@ -19,6 +19,8 @@ from typing import Any, NamedTuple
 from driver_common.errors import DriverError
 
 STORAGE = "mcap"
+NEEDED = ("a bag needs rosbag2_py, which comes with ROS, or rosbags: "
+          "'pip install rosbags', in a virtual environment")
 
 
 class Record(NamedTuple):
@@ -44,6 +46,7 @@ def read_bag(path: Path) -> Iterator[Record]:
     """Yield the messages of a bag in the order of their times; raises DriverError."""
     if not path.exists():
         raise DriverError(f"there is no bag {path}")
+    _check_library()
     try:
         yield from _read_with_ros(path) if has_rosbag2() else _read_without_ros(path)
     except DriverError:
@@ -57,6 +60,7 @@ def write_bag(path: Path) -> Iterator[Write]:
     """Make a bag, and yield what writes a message into it; raises DriverError."""
     if path.exists():
         raise DriverError(f"{path} exists already; name another directory")
+    _check_library()
     with (_write_with_ros(path) if has_rosbag2() else _write_without_ros(path)) as write:
         yield write
 
@@ -64,6 +68,16 @@ def write_bag(path: Path) -> Iterator[Write]:
 def has_rosbag2() -> bool:
     """Whether ROS's own library is there."""
     return importlib.util.find_spec("rosbag2_py") is not None
+
+
+def has_library() -> bool:
+    """Whether any library for bags is there."""
+    return has_rosbag2() or importlib.util.find_spec("rosbags") is not None
+
+
+def _check_library() -> None:
+    if not has_library():
+        raise DriverError(NEEDED)
 
 
 def _read_with_ros(path: Path) -> Iterator[Record]:

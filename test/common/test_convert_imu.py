@@ -12,13 +12,15 @@ import pytest
 from std_msgs.msg import String
 
 from msg_conversions.cdr import serialise
-from sensor_tools import convert_imu
+from sensor_tools import bags, convert_imu
 from sensor_tools.bags import Record, read_bag, write_bag
 
 
 @pytest.fixture
 def bag(tmp_path):
     """A bag with nothing to convert."""
+    if not bags.has_library():
+        pytest.skip(bags.NEEDED)
     with write_bag(tmp_path / "bag") as write:
         write(Record("/chatter", "std_msgs/msg/String", serialise(String(data="hello")), 5))
     return tmp_path / "bag"
@@ -45,3 +47,13 @@ def test_what_cannot_be_converted_is_told(bag, monkeypatch, capsys, arguments, r
 def test_a_bag_is_not_overwritten(bag):
     with pytest.raises(Exception, match="exists already; name another"), write_bag(bag):
         pass
+
+
+@pytest.mark.parametrize("words", [["bag", "new"], ["bag", "new", "--to", "batch"]])
+def test_a_missing_library_is_told(tmp_path, monkeypatch, capsys, words):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(bags, "has_library", lambda: False)
+    (tmp_path / "bag").mkdir()
+    with pytest.raises(SystemExit, match="1"):
+        convert_imu.main(words)
+    assert "pip install rosbags" in capsys.readouterr().err

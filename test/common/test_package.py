@@ -167,7 +167,7 @@ def test_rosdep_brings_what_tests_import_or_they_are_skipped():
     # One module that is missing would keep "colcon test" from running any test.
     package = parse_package(str(ROOT / "package.xml"))
     promised = {each.name for each in package.exec_depends + package.test_depends}
-    files = [path for path in ROOT.glob("test/**/*.py") if path.name != "launch_stand_in.py"]
+    files = list(ROOT.glob("test/**/*.py"))
     ours = {path.stem for path in files} | {path.parent.name for path in ROOT.glob("*/__init__.py")}
     assert len(files) > 50
     for path in files:

@@ -40,7 +40,7 @@ from icotronic_driver.simulator.line import SimulatedIcotronic, simulated_networ
 from icotronic_driver.values import AdcConfiguration
 from msg_conversions.imu_batch import from_imu_batch
 from sensor_tools import convert_imu
-from sensor_tools.bags import Record, read_bag, write_bag
+from sensor_tools.bags import NEEDED, Record, has_library, read_bag, write_bag
 
 DEADLINE = 60.0  # s; far more than anything takes, also on a busy machine
 MODULE, NAME, STATUS = "icotronic_driver.node", "/icotronic", "icotronic: sensor"
@@ -600,6 +600,7 @@ def batches(ros):
     recorder.close()
 
 
+@pytest.mark.skipif(not has_library(), reason=NEEDED)
 def test_a_batch_holds_exactly_the_samples_that_are_published_one_by_one(
         ros, start, launch, samples, batches, tmp_path):
     server = start()

@@ -28,8 +28,9 @@ from icotronic_driver.simulator.line import simulated_network
 from icotronic_driver.simulator.scene import vibration
 from icotronic_driver.values import AdcConfiguration
 
+# Without it, the directory of this file is taken for it; that has no origin.
 pytestmark = pytest.mark.skipif(
-    importlib.util.find_spec("icotronic") is None,
+    getattr(importlib.util.find_spec("icotronic"), "origin", None) is None,
     reason="the package icotronic is not installed; it needs Python 3.12 or later")
 
 CONFIGURATION = """\
