@@ -6,7 +6,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Writes what follows from the tables of the drivers: parameter files and lists of settings.
+"""Writes what follows from the tables of the drivers: parameter files, settings, diagnostics.
 
 `python -m sensor_tools.document` rewrites config/ and docs/, with `--check` it only says whether
 they are up to date.
@@ -25,13 +25,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from driver_common.device_node import DeviceNode
+from driver_common.health import Health
 from driver_common.settings import Option, Parameter, Setting, Value
+from icotronic_driver.health import HEALTH as ICOTRONIC_HEALTH
 from icotronic_driver.node import IcotronicNode
 from icotronic_driver.settings import SETTINGS
+from isys_radar_driver.health import HEALTH as ISYS_HEALTH
 from isys_radar_driver.models import MODELS
 from isys_radar_driver.node import IsysRadarNode
 from isys_radar_driver.settings import settings_of
 from sensor_tools import record_qos
+from uc4000_driver.health import HEALTH as UC4000_HEALTH
 from uc4000_driver.node import Uc4000Node
 from uc4000_driver.settings import ALL_SETTINGS as UC4000_SETTINGS
 
@@ -52,7 +56,8 @@ class Driver:
         node: The class of its node, which has the options.
         models: The settings of each model.
         examples: Values to show where the default, or the first possible value, is of no use.
-        table: File name of the list of settings.
+        page: How the names of its documents begin.
+        health: What its diagnostics say.
         keeping: Whether a device keeps what is written to it.
     """
 
@@ -61,7 +66,8 @@ class Driver:
     node: type[DeviceNode]
     models: Mapping[str, Mapping[str, Setting]]
     examples: Mapping[str, Value]
-    table: str
+    page: str
+    health: Health
     keeping: str = "it is not stored there for good"
 
     @property
@@ -84,15 +90,15 @@ class Driver:
 DRIVERS = (
     Driver("isys_radar", "InnoSenT iSYS radars", IsysRadarNode,
            {model.name: settings_of(model) for model in MODELS.values()},
-           {"serial_port": "/dev/ttyUSB0", "ip.address": "192.168.60.20",
+           {"serial_port": "/dev/serial/by-id/YOUR_ADAPTER", "ip.address": "192.168.60.20",
             "ip.subnet_mask": "255.255.255.0", "ip.gateway": "192.168.60.1",
-            "ip_destination.address": "192.168.60.30"}, "isys_settings.md"),
+            "ip_destination.address": "192.168.60.30"}, "isys", ISYS_HEALTH),
     Driver("icotronic", "ICOtronic wireless accelerometers", IcotronicNode,
            {"STH": SETTINGS}, {"can_channel": "can0", "name": "Spindle"},
-           "icotronic_settings.md"),
+           "icotronic", ICOTRONIC_HEALTH),
     Driver("uc4000", "Pepperl+Fuchs UC4000 ultrasonic sensors", Uc4000Node,
-           {"UC4000": UC4000_SETTINGS}, {"serial_port": "/dev/ttyUSB0"}, "uc4000_settings.md",
-           keeping="the sensor itself stores it for good"),
+           {"UC4000": UC4000_SETTINGS}, {"serial_port": "/dev/serial/by-id/YOUR_ADAPTER"}, "uc4000",
+           UC4000_HEALTH, keeping="the sensor itself stores it for good"),
 )
 
 
@@ -280,6 +286,27 @@ def _markdown(heading: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str
     return [f"| {' | '.join(cells)} |" for cells in (heading, ["---"] * len(heading), *rows)]
 
 
+# --- diagnostics ---
+
+def diagnostics(driver: Driver) -> str:
+    """Return what the diagnostics of a driver say as Markdown."""
+    several = " one for each sensor," * driver.node.SEVERAL_SENSORS
+    return "\n".join([
+        f"# Diagnostics of {driver.name}_node", "",
+        "<!-- Made by 'python -m sensor_tools.document' from the tables in the code. -->", "",
+        f"Once a second the node publishes a status on `/diagnostics`,{several} named "
+        "`namespace/node: sensor`. `…` stands for what changes.", "",
+        "## Levels and messages", "",
+        *_markdown(("Level", "Message", "Meaning"),
+                   ((state.level, f"`{state.text}`", state.meaning)
+                    for state in driver.health.states)), "",
+        "## Keys", "",
+        "Counters count since the start of the node. A key is missing while there is nothing to "
+        "say.", "",
+        *_markdown(("Key", "Meaning"),
+                   ((f"`{key.text}`", key.meaning) for key in driver.health.keys)), ""])
+
+
 # --- files ---
 
 def documents() -> dict[Path, str]:
@@ -287,7 +314,8 @@ def documents() -> dict[Path, str]:
     files = {}
     for driver in DRIVERS:
         files[ROOT / "config" / f"{driver.name}.yaml"] = parameter_file(driver)
-        files[ROOT / "docs" / driver.table] = table(driver)
+        files[ROOT / "docs" / f"{driver.page}_settings.md"] = table(driver)
+        files[ROOT / "docs" / f"{driver.page}_diagnostics.md"] = diagnostics(driver)
     files[ROOT / "config" / "record_qos.yaml"] = record_qos.profiles(record_qos.USUAL)
     return files
 
