@@ -65,16 +65,18 @@ class Process:
         module: Module whose `main` is the program.
         arguments: Its arguments.
         before: Code to run before.
+        within: Command that runs the program elsewhere, such as in a network namespace.
+        env: What its environment has beside that of the test.
     """
 
-    def __init__(self, module, *arguments, before=""):
+    def __init__(self, module, *arguments, before="", within=(), env=None):
         self.lines = []
         self._news = threading.Condition()
         self._process = subprocess.Popen(
-            [sys.executable, "-c",
+            [*within, sys.executable, "-c",
              f"{END_WITH_PARENT}\n{before}\nfrom {module} import main; main()", *arguments],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-            env={**os.environ, "PYTHONUNBUFFERED": "1"})
+            env={**os.environ, "PYTHONUNBUFFERED": "1", **(env or {})})
         self._reader = threading.Thread(target=self._read)
         self._reader.start()
 
@@ -152,12 +154,13 @@ class NodeProcess(Process):
         module: Module whose `main` runs the node.
         parameters: Values for `-p`.
         arguments: More ROS arguments, for example "-r", "__ns:=/left".
+        how: As for a Process.
     """
 
-    def __init__(self, module, parameters=None, *arguments):
+    def __init__(self, module, parameters=None, *arguments, **how):
         for name, value in (parameters or {}).items():
             arguments += "-p", f"{name}:={json.dumps(value)}"
-        super().__init__(module, "--ros-args", *arguments, before=OFTEN)
+        super().__init__(module, "--ros-args", *arguments, before=OFTEN, **how)
 
 
 class Status(NamedTuple):

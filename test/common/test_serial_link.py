@@ -10,7 +10,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import socket
 import stat
@@ -19,7 +18,7 @@ import time
 import tty
 
 import pytest
-import serial.rfc2217
+from rfc2217_server import Rfc2217Server
 
 from driver_common import serial_link
 from driver_common.errors import LinkError
@@ -279,48 +278,6 @@ def test_a_simulated_line_that_was_closed_leaves_later_ones_alone(tmp_path):
 
 
 # --- ports elsewhere -----------------------------------------------------------------------------
-
-class PortWithoutModemLines(serial.Serial):
-    """A port on a pseudo-terminal, which has no such lines."""
-
-    cts = dsr = ri = cd = False
-
-    def _update_rts_state(self):
-        pass
-
-    _update_dtr_state = _update_break_state = _update_rts_state
-
-
-class Rfc2217Server:
-    """A serial port offered over the network, with pyserial's own server side."""
-
-    def __init__(self, path):
-        self.port = PortWithoutModemLines(path, timeout=0.05)
-        self._server = socket.create_server(("127.0.0.1", 0))
-        self.url = f"rfc2217://127.0.0.1:{self._server.getsockname()[1]}"
-        threading.Thread(target=self._serve, daemon=True).start()
-
-    def _serve(self):
-        self._connection, _ = self._server.accept()
-        manager = serial.rfc2217.PortManager(self.port, self)
-        threading.Thread(target=self._receive, args=[manager], daemon=True).start()
-        with contextlib.suppress(OSError):
-            while data := self._connection.recv(1024):
-                self.port.write(b"".join(manager.filter(data)))
-
-    def _receive(self, manager):
-        with contextlib.suppress(OSError, TypeError):  # closed
-            while True:
-                if data := self.port.read(self.port.in_waiting or 1):
-                    self.write(b"".join(manager.escape(data)))
-
-    def write(self, data):
-        self._connection.sendall(data)
-
-    def close(self):
-        self._connection.close()
-        self._server.close()
-
 
 def test_a_port_over_rfc_2217(terminal):
     server = Rfc2217Server(terminal.path)
