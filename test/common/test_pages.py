@@ -138,6 +138,7 @@ def test_the_messages_of_its_failure_table_are_in_the_code(driver):
 
 def test_the_spectrum_finds_what_vibrates(tmp_path, monkeypatch, capsys):
     """The lines of the page itself, on a bag with lost samples."""
+    pytest.importorskip("rosbags", reason="rosbags comes with ./dev")
     page = (DOCS / "record_and_analyse.md").read_text()
     (lines,) = (code for _, language, code in FENCE.findall(page) if language == "python")
     start, rate = 1_795_000_000_123_456_789, 9524.0
