@@ -33,13 +33,12 @@ from msg_conversions.temperature import to_temperature
 from uc4000_driver.acquisition import OPERATING_TEMPERATURE, Listener
 from uc4000_driver.commands import MAX_CYCLES, PROFILES, Outcome
 from uc4000_driver.line import ECHO_CHOICES
-from uc4000_driver.sensor import Measurement, Options, Sensor
+from uc4000_driver.sensor import FIELD_OF_VIEW, Measurement, Options, Sensor
 from uc4000_driver.session import Uc4000Bus
 from uc4000_driver.settings import ALL_SETTINGS
 from uc4000_driver.telegram import BAUD_RATE, LAST_ADDRESS, error_text
 
 SIMULATED = "sim://"
-FIELD_OF_VIEW = 0.26  # rad, 15°: assumed, the manual only draws the cones (errata U12)
 
 
 def _words(*words: str) -> dict[str, int]:

@@ -20,6 +20,7 @@ from uc4000_driver.commands import PROFILES, Distance, Outcome, Profile
 from uc4000_driver.telegram import CAST
 
 PRODUCT = "UC4000"
+FIELD_OF_VIEW = 0.26  # rad, 15°: assumed, the manual only draws the cones (errata U12)
 RATE_WINDOW = 5.0  # s over which the rate is measured
 
 

@@ -12,25 +12,31 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 import os
 import pty
 import signal
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import click
+import numpy as np
 import pytest
 import yaml
 from bench_sensors import PATIENCE, Bench, run
 
+from icotronic_driver.laws import Law
+from icotronic_driver.sensor import Channel
 from isys_radar_driver.simulator.radar import SimulatedRadar
-from sensor_tools import document, node_files
+from sensor_tools import document, messages, node_files
 from sensor_tools.cli import output
 from sensor_tools.cli.program import sensors
 from sensor_tools.search import icotronic
 from sensor_tools.search.place import CanPlace, SerialPlace
 from sensor_tools.search.result import Found
+from uc4000_driver.commands import PROFILES
 
 MODULE = "isys_radar_driver.node"
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -308,6 +314,84 @@ def test_samples_are_recorded_one_by_one(bench, command):
     assert list(rows[0]) == ["time [s]", "x [m/s²]", "z [m/s²]"]
     assert all(-1000 < float(row[name]) < 1000 for row in rows for name in list(row)[1:])
     assert f"{len(rows)} measurements" in outcome.err
+
+
+def read_mcap(file):
+    """Return schemas and messages of a file, by rosbags, which knows nothing of ours."""
+    rosbags = pytest.importorskip("rosbags.highlevel", reason="rosbags is not installed")
+    with rosbags.AnyReader([file]) as reader:
+        assert {each.msgdef.format.name for each in reader.connections} == {"MSG"}  # of ros2msg
+        found = [(each.topic, each.msgtype, reader.deserialize(data, each.msgtype))
+                 for each, _, data in reader.messages()]
+    ((topic, kind),) = {(topic, kind) for topic, kind, _ in found}
+    return topic, kind, [message for _, _, message in found]
+
+
+def stamps_of(found):
+    return [each.header.stamp.sec * 10**9 + each.header.stamp.nanosec for each in found]
+
+
+def test_target_lists_become_clouds(bench, command, tmp_path):
+    line, _ = bench.radars("iSYS-4001")
+    words = ["record", tmp_path / "a.mcap", "--port", line.port, *RADAR, "--duration", 1]
+    outcome = command(*words)
+    topic, kind, clouds = read_mcap(tmp_path / "a.mcap")
+    assert (topic, kind) == ("/isys_radar/points", "sensor_msgs/msg/PointCloud2")
+    assert f"{len(clouds)} measurements in " in outcome.err
+    for cloud in clouds:
+        assert cloud.header.frame_id == "isys_radar_link"
+        points = cloud.data.view("<f4").reshape(cloud.width, -1)
+        np.testing.assert_allclose(np.hypot(points[:, 0], points[:, 1]), points[:, 4], rtol=1e-5)
+    assert max(cloud.width for cloud in clouds) > 0
+    assert stamps_of(clouds) == sorted(set(stamps_of(clouds)))
+    before = (tmp_path / "a.mcap").read_bytes()
+    again = command(*words)
+    assert (again.code, "exists already; --overwrite replaces it" in again.err) == (1, True)
+    assert (tmp_path / "a.mcap").read_bytes() == before
+    assert command(*words, "--overwrite").code == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["a.mcap"]
+
+
+def test_distances_become_ranges(bench, command, tmp_path):
+    line, _ = bench.ultrasonic_sensors(2)
+    command("record", tmp_path / "a.mcap", "--port", line.port, "--duration", 1)
+    topic, kind, ranges = read_mcap(tmp_path / "a.mcap")
+    assert (topic, kind) == ("/uc4000/range", "sensor_msgs/msg/Range")
+    assert {(round(each.min_range, 3), round(each.max_range, 3)) for each in ranges} == {
+        tuple(round(limit, 3) for limit in PROFILES["b"].limits)}
+    assert all(math.isinf(each.range) or each.min_range <= each.range <= each.max_range
+               for each in ranges)
+
+
+def test_samples_become_imus(bench, command, tmp_path):
+    _, words = bench.network()
+    outcome = command("record", tmp_path / "a.mcap", *words, "--duration", 0.5, "--with",
+                      "channels=xz")
+    topic, kind, imus = read_mcap(tmp_path / "a.mcap")
+    assert (topic, kind) == ("/icotronic/imu/data_raw", "sensor_msgs/msg/Imu")
+    assert f"{len(imus)} measurements in " in outcome.err
+    assert stamps_of(imus) == sorted(stamps_of(imus))
+    assert {each.linear_acceleration.y for each in imus} == {0.0}
+    assert any(each.linear_acceleration.x for each in imus)
+    assert imus[0].angular_velocity_covariance[0] == -1.0
+
+
+def test_what_is_no_acceleration_has_a_topic_of_its_own():
+    channels = [Channel("x", Law((0.0, 1.0), (0.0, 1.0), unit), "", 1.0, 0.0)
+                for unit in ("°C", "V")]
+    convert = messages.of_sth(SimpleNamespace(channels=[channels[0],
+                                                        channels[1]._replace(name="y")]))
+    assert [(record.topic, record.kind) for record in convert(5, [(21.0, 1.5)])] == [
+        ("/icotronic/channel_x/temperature", "sensor_msgs/msg/Temperature"),
+        ("/icotronic/channel_y/value", "std_msgs/msg/Float64")]
+
+
+def test_without_the_classes_of_ros_only_csv_is_recorded(bench, command, tmp_path, monkeypatch):
+    line, _ = bench.radars("iSYS-4001")
+    monkeypatch.setitem(sys.modules, "sensor_tools.messages", None)
+    outcome = command("record", tmp_path / "a.mcap", "--port", line.port, *RADAR)
+    assert (outcome.code, "message classes of ROS" in outcome.err) == (1, True)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_watch_shows_the_last_measurement_in_a_pipe(bench, command):
