@@ -96,7 +96,10 @@ def udev_rule(place: Place, name: str) -> str:
     info = next((info for info in list_ports.comports() if info.device == device), None)
     if info is None or info.vid is None or info.pid is None:
         return ""
+    socket, _, interface = (info.location or "").partition(":")  # the latter only of several
     which = (f'ATTRS{{serial}}=="{info.serial_number}"' if info.serial_number
-             else f'KERNELS=="{info.location}"')  # without a number: this socket
+             else f'KERNELS=="{socket}"')  # without a number: this socket
+    if interface:  # udev compares ATTRS and KERNELS with one and the same device: the adapter
+        which += f', ENV{{ID_USB_INTERFACE_NUM}}=="{int(interface.rpartition(".")[2]):02x}"'
     return (f'SUBSYSTEM=="tty", ATTRS{{idVendor}}=="{info.vid:04x}", '
             f'ATTRS{{idProduct}}=="{info.pid:04x}", {which}, SYMLINK+="{name}"')

@@ -18,6 +18,7 @@ from pathlib import Path
 import click
 import numpy as np
 import pytest
+from nodes import NodeProcess, Process
 
 from msg_conversions.imu_batch import ImuBatchTemplate
 from sensor_tools import simulate
@@ -157,6 +158,39 @@ def test_the_spectrum_finds_what_vibrates(tmp_path, monkeypatch, capsys):
         r"strongest: ([\d.]+) m/s² at ([\d.]+) Hz\n", capsys.readouterr().out).groups())
     assert amplitude == pytest.approx(4.0, rel=0.02)
     assert frequency == pytest.approx(437.0, abs=0.5)
+
+
+def test_commands_of_the_vendors_tool_are_those_that_it_has():
+    parse = pytest.importorskip("icotronic.cmdline.parse", reason="the vendor's tool is not here")
+    commands = re.findall(r"`icon ([^`]+)`", (DOCS / "from_vendor_tool.md").read_text())
+    assert {command.split()[0] for command in commands} == {
+        "list", "measure", "dataloss", "rename", "stu", "config"}
+    for command in commands:
+        arguments = command.split()
+        if arguments[0] in ("measure", "dataloss") and "--name" not in arguments:
+            arguments += "--name", "Spindle"  # it always wants one
+        parse.create_icon_parser().parse_args(arguments)
+
+
+@pytest.mark.parametrize(("family", "arguments", "module", "sensors"), [
+    ("isys", ("--model", "iSYS-4001,iSYS-4001", "--address", "128,129"),
+     "isys_radar_driver.node", ("front", "rear")),
+    ("uc4000", ("--addresses", "1,2,3,4,5"), "uc4000_driver.node",
+     ("left", "right", "front", "rear", "tank"))])
+def test_the_shipped_file_of_a_wire_finds_its_sensors(family, arguments, module, sensors, tmp_path):
+    """The command line of the page, but for the program that starts the node."""
+    line = str(tmp_path / "line")
+    (file,) = (ROOT / "config").glob(f"{family}*_on_one_line.yaml")
+    page = (DOCS / "several_sensors.md").read_text()
+    assert f"simulate {family} {' '.join(arguments)} --link" in page
+    assert file.name in page
+    with Process("sensor_tools.simulate", family, *arguments, "--link", line) as simulator:
+        simulator.wait_for_line(line)
+        with NodeProcess(module, None, "--params-file", str(file), "-p",
+                         f"serial_port:={line}") as node:
+            for sensor in sensors:
+                node.wait_for_line(f"{sensor}: connected to")
+            node.stop()
 
 
 def test_python_in_pages_is_python():

@@ -147,10 +147,14 @@ class Adapter:
     device, vid, pid, serial_number, location = "/dev/ttyUSB7", 0x0403, 0x6001, "A1B2", "1-4.2"
 
 
-@pytest.mark.parametrize(("number", "which"), [
-    ("A1B2", 'ATTRS{serial}=="A1B2"'), (None, 'KERNELS=="1-4.2"')])
-def test_a_rule_names_the_adapter(monkeypatch, number, which):
+@pytest.mark.parametrize(("number", "location", "which"), [
+    ("A1B2", "1-4.2", 'ATTRS{serial}=="A1B2"'), (None, "1-4.2", 'KERNELS=="1-4.2"'),
+    # an adapter with several ports, of which pyserial names the interface
+    ("A1B2", "1-4.2:1.3", 'ATTRS{serial}=="A1B2", ENV{ID_USB_INTERFACE_NUM}=="03"'),
+    (None, "1-4.2:1.10", 'KERNELS=="1-4.2", ENV{ID_USB_INTERFACE_NUM}=="0a"')])
+def test_a_rule_names_the_adapter(monkeypatch, number, location, which):
     monkeypatch.setattr(Adapter, "serial_number", number)
+    monkeypatch.setattr(Adapter, "location", location)
     monkeypatch.setattr(node_files.list_ports, "comports", lambda: [Adapter])
     assert node_files.udev_rule(SerialPlace("/dev/ttyUSB7"), "isys_radar") == (
         'SUBSYSTEM=="tty", ATTRS{idVendor}=="0403", ATTRS{idProduct}=="6001", '
