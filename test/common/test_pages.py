@@ -142,6 +142,8 @@ def test_the_spectrum_finds_what_vibrates(tmp_path, monkeypatch, capsys):
     pytest.importorskip("rosbags", reason="rosbags comes with ./dev")
     page = (DOCS / "record_and_analyse.md").read_text()
     (lines,) = (code for _, language, code in FENCE.findall(page) if language == "python")
+    assert len([line for line in lines.splitlines()
+                if line and not line.startswith(("import", "print"))]) == 10
     start, rate = 1_795_000_000_123_456_789, 9524.0
     numbers = np.delete(np.arange(2 * 9524), np.s_[5000:5003])
     stamps = start + np.round(numbers / rate * 1e9).astype(np.int64)
