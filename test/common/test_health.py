@@ -8,6 +8,7 @@
 
 """The tables of what the diagnostics say, against what running nodes publish."""
 
+import ast
 import json
 import re
 from contextlib import ExitStack
@@ -17,7 +18,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from nodes import NodeProcess, Process, Ros
 
-from driver_common.health import GAP, unexplained
+from driver_common.health import GAP, pattern, unexplained
 from sensor_tools.document import DRIVERS
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -100,6 +101,30 @@ def test_every_explained_message_is_one_of_the_code(name):
     for state in HEALTH[name].states:
         for piece in filter(None, map(str.strip, PIECES.split(state.text))):
             assert piece in code, state.text
+
+
+def said(path):
+    """Yield each level and text, with gaps, that a file says together."""
+    for tree in ast.walk(ast.parse(path.read_text())):
+        parts = getattr(tree, "elts", None) or getattr(tree, "args", None)
+        if not isinstance(parts, list) or len(parts) != 2:
+            continue
+        level, text = parts
+        if isinstance(text, ast.Constant):
+            text = ast.JoinedStr([text])
+        if getattr(level, "attr", "") in LEVELS.values() and isinstance(text, ast.JoinedStr):
+            yield level.attr, "".join(
+                GAP if isinstance(part, ast.FormattedValue) else part.value for part in text.values)
+
+
+@pytest.mark.parametrize("name", HEALTH)
+def test_every_level_is_that_of_the_code(name):
+    files = ROOT / MODULES[name].replace(".", "/"), ROOT / "driver_common" / "device_node"
+    pairs = [pair for file in files for pair in said(file.with_suffix(".py"))]
+    assert len(pairs) >= 4
+    for level, text in pairs:
+        assert any(row.level == level and re.fullmatch(pattern(text), row.text)
+                   for row in HEALTH[name].states), (level, text)
 
 
 def test_gaps_stand_for_anything_but_nothing():
