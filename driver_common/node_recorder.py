@@ -242,5 +242,3 @@ def _version(package: str) -> str:
         return importlib.metadata.version(package)
     except importlib.metadata.PackageNotFoundError:
         return str(getattr(module, "__version__", "not installed as a package"))
-
-

@@ -71,7 +71,6 @@ _STATE_REASONS = {1: "set state not available", 2: "wrong subscriber"}  # sectio
 # --- bytes in and out ---
 
 
-
 def _bytes(data: bytes) -> bytes:
     unpack_exactly(data, "8s")
     return bytes(data)
@@ -87,11 +86,6 @@ def _nothing() -> bytes:
 
 def _empty() -> bytes:
     return b""
-
-
-
-
-
 
 
 # --- system (section 10.2) ---

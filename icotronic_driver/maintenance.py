@@ -178,6 +178,7 @@ class Maintenance:
             raise RefusedError(f"the EEPROM took {field.text(value)} but holds "
                                f"{field.text(stored)}; it may be locked")
 
+
 def _raw(field: Field, value: FieldValue) -> bytes:
     """Return the bytes of a value that was read, also of a number that cannot be written."""
     try:

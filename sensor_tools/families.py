@@ -74,7 +74,6 @@ class Family:
     factory_reset: Callable[[Bus, Device], None]
 
 
-
 def _by_name(*options: Parameter) -> Mapping[str, Parameter]:
     return {option.name: option for option in options}
 
@@ -215,5 +214,3 @@ def families_of(place: SerialPlace | CanPlace, only: str = "") -> list[Family]:
         raise SettingError(f"an {only} sensor is not on {place}: give "
                            f"{'--can' if only == 'icotronic' else '--port'}")
     return [FAMILIES[name] for name in names if only in ("", name)]
-
-

@@ -111,7 +111,6 @@ class SimulatedSth(SimulatedNode):
         connected: Whether it has a connection to the stationary unit.
     """
 
-
     def __init__(self, name: str, mac: str = FIRST_MAC, *, calibrated: bool = True,
                  can_fd: bool = False) -> None:
         """Power it on for the first time; without calibration its factors are 0 (errata C9)."""

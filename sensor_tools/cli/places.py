@@ -151,5 +151,3 @@ def require_place(wanted: Wanted) -> Place:
     if wanted.place is None:
         raise SettingError("which sensor? give --port or --can; 'sensors scan' shows all of them")
     return wanted.place
-
-

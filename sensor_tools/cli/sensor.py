@@ -117,5 +117,3 @@ def _fits(found: Found, wanted: Wanted) -> bool:
 
 def _number(address: str) -> int:
     return int(address) if address.isdecimal() else -1
-
-

@@ -164,8 +164,6 @@ def test_a_directory_that_cannot_be_written_is_told_once(ros, tmp_path):
     assert len(lines) == 2  # once of its own accord, once as the answer
 
 
-
-
 # --- replay ------------------------------------------------------------------------------------
 
 def play(driver, path):

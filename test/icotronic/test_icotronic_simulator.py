@@ -282,7 +282,8 @@ def test_errors() -> None:
         (commands.WRITE_STATE.request(STU, NetworkState.OPERATING, CodeLocation.BOOTLOADER),
          "wrong subscriber"),
         (commands.READ_STH_STATUS.with_payload(STH, bytes(4) + b"\xff", bytes), "error 01"),
-        (commands.READ_CALIBRATION_K.request(STH, 99, 1), "not available"),  # type: ignore[arg-type]
+        (commands.READ_CALIBRATION_K.request(
+            STH, 99, 1), "not available"),  # type: ignore[arg-type]
     ]
     for request, words in refusals:
         with pytest.raises(RefusedError, match=words):

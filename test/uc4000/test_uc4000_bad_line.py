@@ -40,6 +40,7 @@ from uc4000_driver.telegram import CAST, ErrorCode, Reply, Request
 
 # --- the line's echo ---------------------------------------------------------------------------
 
+
 @pytest.mark.parametrize(("setting", "echo"), [
     ("auto", True), ("auto", False), ("on", True), ("off", False)])
 def test_the_echo_is_stripped(connect, setting, echo):
@@ -192,6 +193,7 @@ def test_two_replies_to_one_request(connect):
     assert "several devices have address 4" in str(error)
 
 # --- damage, refusals, silence -----------------------------------------------------------------
+
 
 def test_damaged_replies_are_counted_and_never_believed(one):
     line, _, master = one

@@ -39,6 +39,7 @@ STEP = 0.016  # m
 
 # --- finding and measuring ---------------------------------------------------------------------
 
+
 def test_a_sensor_is_found_by_asking_for_its_address(connect):
     line, (simulated,) = connect()
     master = connect.master(line, Options()).find()
@@ -379,6 +380,7 @@ def test_a_setting_that_the_firmware_does_not_have_is_left_out(connect):
     assert "this firmware has no current_ma" in master.heard.notes
 
 # --- addresses ---------------------------------------------------------------------------------
+
 
 def test_an_address_is_assigned_and_followed(one):
     _, simulated, master = one

@@ -45,6 +45,7 @@ _PROFILES = {profile.op_code: profile for profile in PROFILES.values()}
 _RECORDS = {setting.record.op_code: (setting, setting.record) for setting in ALL_SETTINGS.values()
             if isinstance(setting.record, Uc4000Record)}
 
+
 class Refusal(Exception):  # noqa: N818
     """The sensor refuses, with the code that it is given."""
 
