@@ -18,6 +18,7 @@ from pathlib import Path
 import click
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from nodes import NodeProcess, Process
 
 from msg_conversions.imu_batch import ImuBatchTemplate
@@ -160,6 +161,18 @@ def test_the_spectrum_finds_what_vibrates(tmp_path, monkeypatch, capsys):
         r"strongest: ([\d.]+) m/s² at ([\d.]+) Hz\n", capsys.readouterr().out).groups())
     assert amplitude == pytest.approx(4.0, rel=0.02)
     assert frequency == pytest.approx(437.0, abs=0.5)
+
+
+def test_a_spectrum_can_be_made_from_csv(tmp_path, monkeypatch):
+    page = (DOCS / "record_and_analyse.md").read_text()
+    (line,) = re.findall(r"`(times, x = np.loadtxt.*?)`", page)
+    monkeypatch.chdir(tmp_path)
+    assert CliRunner().invoke(sensors, [
+        "record", "spindle.csv", "--can", "sim", "--duration", "0.5"]).exit_code == 0
+    found = {"np": np}
+    exec(line, found)
+    assert len(found["times"]) == len(found["x"]) > 100
+    assert np.all(np.diff(found["times"]) > 0)
 
 
 def test_commands_of_the_vendors_tool_are_those_that_it_has():
