@@ -12,6 +12,7 @@ project = "industrial_sensor_drivers"
 copyright = "2026, industrial_sensor_drivers maintainers"  # the name that Sphinx wants
 extensions = ["myst_parser"]
 myst_heading_anchors = 3  # anchors as on GitHub, so that links work in both
+exclude_patterns = ["_build"]
 suppress_warnings = ["misc.highlighting_failure"]  # a log is no program
 html_theme = "alabaster"
 html_theme_options = {"description": "ROS 2 drivers for industrial sensors", "page_width": "1100px"}

@@ -17,10 +17,10 @@ from industrial_sensor_drivers.launch_file import include_driver
 def generate_launch_description():
     """Describe the three nodes; each serves all sensors on its wire."""
     return LaunchDescription([
-        DeclareLaunchArgument("radar_port", default_value="/dev/ttyUSB0",
-                              description="RS-485 adapter of the radars."),
-        DeclareLaunchArgument("ultrasonic_port", default_value="/dev/ttyUSB1",
-                              description="LIN adapter of the ultrasonic sensors."),
+        DeclareLaunchArgument("radar_port", default_value="/dev/isys_radar",
+                              description="RS-485 adapter of the radars, named by a udev rule."),
+        DeclareLaunchArgument("ultrasonic_port", default_value="/dev/uc4000",
+                              description="LIN adapter of the ultrasonic sensors, as well."),
         DeclareLaunchArgument("can_interface", default_value="socketcan",
                               description="Interface of python-can, or sim."),
         include_driver("isys_radar", "isys_radars_on_one_line.yaml",

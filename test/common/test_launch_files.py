@@ -48,5 +48,5 @@ def test_a_whole_machine():
         ("isys_radar_node", "isys_radar", "", ["isys_radars_on_one_line.yaml"],
          {"serial_port": "/dev/radars"}),
         ("uc4000_node", "uc4000", "", ["uc4000_sensors_on_one_line.yaml"],
-         {"serial_port": "/dev/ttyUSB1"}),
+         {"serial_port": "/dev/uc4000"}),
         ("icotronic_node", "icotronic", "", ["icotronic.yaml"], {"can_interface": "socketcan"})]
