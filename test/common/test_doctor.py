@@ -25,6 +25,7 @@ import pytest
 import rclpy
 import serial
 from bench_sensors import Bench, VirtualLink, run
+from bus_master import needs_errors_of_socketcand
 
 from driver_common.simulator.bus import CanFrame
 from sensor_tools.cli.places import Wanted
@@ -244,6 +245,7 @@ def test_a_bus_that_is_down(doctor, monkeypatch):
     assert doctor("--can", "can0")[0] == ["cannot open socketcan can0: it is down"]
 
 
+@needs_errors_of_socketcand
 def test_error_frames(bench, doctor):
     network, words = bench.network("One")
     for number in range(100):
