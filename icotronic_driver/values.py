@@ -230,12 +230,12 @@ def encode_text(text: str, length: int) -> bytes:
     """Return a text as UTF-8, padded with zeros (errata C13).
 
     Raises:
-        SettingError: The text is too long or holds a zero.
+        SettingError: The text is too long, holds a zero, or what is no UTF-8.
     """
-    data = text.encode()
-    if len(data) > length or b"\0" in data:
-        raise SettingError(f'"{text}" does not fit, it may have at most {length} bytes in UTF-8 '
-                           "and no zero")
+    data = text.encode(errors="replace")
+    if len(data) > length or b"\0" in data or data.decode() != text:
+        raise SettingError(f'"{data.decode()}" does not fit, it may have at most {length} bytes in '
+                           "UTF-8 and no zero")
     return data.ljust(length, b"\0")
 
 

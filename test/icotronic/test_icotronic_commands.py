@@ -179,7 +179,7 @@ def test_names() -> None:  # errata C13
     assert commands.encode_name("") == (bytes(6), bytes(2))
     assert commands.decode_name(b"Halle\xc3", b"\x9f1") == "Halleß1"
     assert commands.decode_name(b"AB\0\0\0\0", bytes(2)) == "AB"
-    for name in ("Test-STH1", "Tür-Nord", "A\0B"):
+    for name in ("Test-STH1", "Tür-Nord", "A\0B", "\udcf0"):
         with pytest.raises(SettingError, match="at most 8 bytes"):
             commands.encode_name(name)
 
