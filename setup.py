@@ -33,6 +33,7 @@ setup(
         (SHARE, ["package.xml"]),
         (f"{SHARE}/launch", sorted(glob("launch/*.py"))),
         (f"{SHARE}/config", sorted(glob("config/*.yaml"))),
+        (f"{SHARE}/config/security", sorted(glob("config/security/*.xml"))),
         (f"{SHARE}/rviz", sorted(glob("rviz/*.rviz"))),
     ],
     entry_points={

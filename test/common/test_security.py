@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 from nodes import NodeProcess, Ros
@@ -39,3 +40,50 @@ def test_nothing_listens_but_dds(name):
         ros.remote(f"/{name}").names()
         assert not [row for row in sockets(process.number, "tcp") if row[3] == LISTEN]
         assert sockets(process.number, "udp")  # so those of the process are found
+
+
+POLICIES = Path(__file__).resolve().parents[2] / "config" / "security"
+SIMULATED = {
+    "isys_radar": ("serial_port", ("sim://iSYS-4001", "sim://iSYS-6003")),
+    "icotronic": ("can_interface", ("sim",)),
+    "uc4000": ("serial_port", ("sim://UC4000",)),
+}
+
+
+def graph(ros, name):
+    """Return what a node publishes, subscribes to, answers and asks, its own names with ~."""
+    def names(found):
+        return {topic.replace(f"/{name}/", "~/").removeprefix("/") for topic, _ in found(name, "/")}
+
+    node = ros.node
+    return (names(node.get_publisher_names_and_types_by_node),
+            names(node.get_subscriber_names_and_types_by_node),
+            names(node.get_service_names_and_types_by_node),
+            names(node.get_client_names_and_types_by_node))
+
+
+def allowed(name):
+    """Return what the policy of a node allows, in the order of `graph`."""
+    profile = ElementTree.parse(POLICIES / f"{name}.xml").find(f".//profile[@node='{name}']")
+    return tuple({one.text for one in profile.findall(f"{group}[@{verb}='ALLOW']/{group[:-1]}")}
+                 for group, verb in (("topics", "publish"), ("topics", "subscribe"),
+                                     ("services", "reply"), ("services", "request")))
+
+
+@pytest.mark.parametrize("name", SIMULATED)
+def test_a_policy_allows_what_its_node_does_and_no_more(name):
+    parameter, devices = SIMULATED[name]
+    policy, seen = allowed(name), [set(), set(), set(), set()]
+    for device in devices:
+        with Ros() as ros, NodeProcess(NODES[name][0], {parameter: device}):
+            remote = ros.remote(f"/{name}")
+            ros.wait_until(lambda remote=remote: remote.state() == "active")
+            ros.wait(lambda seen=seen, ros=ros: _add(seen, graph(ros, name)) == list(policy), 20.0
+                     if device == devices[-1] else 5.0)
+    assert seen == list(policy)
+
+
+def _add(seen, more):
+    for names, new in zip(seen, more, strict=True):
+        names |= new
+    return seen
