@@ -94,7 +94,17 @@ watch: SignalWatch | None = None
 
 
 def start(module: str) -> None:
-    """Run `main` of a module, which can take a second to import."""
+    """Run `main` of a module, which can take a second to import, and end the process.
+
+    The middleware's own end can crash where its threads outlive the interpreter, so it is left out.
+    """
     global watch
     watch = SignalWatch()
-    importlib.import_module(module).main()
+    code: object = 0
+    try:
+        importlib.import_module(module).main()
+    except SystemExit as end:
+        code = end.code or 0
+    if isinstance(code, int):
+        _end(code)
+    _end(1, str(code))
