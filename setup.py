@@ -33,8 +33,11 @@ setup(
         (SHARE, ["package.xml"]),
         (f"{SHARE}/launch", sorted(glob("launch/*.py"))),
         (f"{SHARE}/config", sorted(glob("config/*.yaml"))),
+        (f"{SHARE}/config/next_stages", sorted(glob("config/next_stages/*.yaml"))),
         (f"{SHARE}/config/security", sorted(glob("config/security/*.xml"))),
+        (f"{SHARE}/layouts", sorted(glob("layouts/*"))),
         (f"{SHARE}/rviz", sorted(glob("rviz/*.rviz"))),
+        (f"{SHARE}/urdf", sorted(glob("urdf/*.xacro"))),
     ],
     entry_points={
         "console_scripts": [
@@ -43,6 +46,7 @@ setup(
             "doctor = industrial_sensor_drivers.programs:doctor",
             "icotronic_node = industrial_sensor_drivers.programs:icotronic_node",
             "isys_radar_node = industrial_sensor_drivers.programs:isys_radar_node",
+            "radar_scan = industrial_sensor_drivers.programs:radar_scan",
             "record_qos = industrial_sensor_drivers.programs:record_qos",
             "sensors = industrial_sensor_drivers.programs:sensors",
             "simulate = industrial_sensor_drivers.programs:simulate",

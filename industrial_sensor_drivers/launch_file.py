@@ -11,23 +11,31 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from launch import LaunchContext, LaunchDescription
 from launch.actions import (
     DeclareLaunchArgument,
+    EmitEvent,
     GroupAction,
     IncludeLaunchDescription,
     OpaqueFunction,
     PopLaunchConfigurations,
     PushLaunchConfigurations,
+    RegisterEventHandler,
 )
+from launch.events import matches_action
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
-from launch_ros.actions import Node
+from launch_ros.actions import LifecycleNode, Node
+from launch_ros.event_handlers import OnStateTransition
+from launch_ros.events.lifecycle import ChangeState
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
+from lifecycle_msgs.msg import Transition
 
 PACKAGE = "industrial_sensor_drivers"
+PORTS = {"isys_radar": "serial_port", "icotronic": "can_channel", "uc4000": "serial_port"}
 
 
 def describe_driver(executable: str, name: str, link: Mapping[str, str]) -> LaunchDescription:
@@ -44,16 +52,11 @@ def describe_driver(executable: str, name: str, link: Mapping[str, str]) -> Laun
     """
     def make_node(context: LaunchContext) -> list[Node]:
         values = {key: LaunchConfiguration(key).perform(context) for key in link}
-        given = {key: ParameterValue(value, value_type=str)  # also where it looks like a number
-                 for key, value in values.items() if value}
-        return [Node(
-            package=PACKAGE, executable=executable, output="screen",
-            name=LaunchConfiguration("name"), namespace=LaunchConfiguration("namespace"),
-            parameters=[LaunchConfiguration("params_file"), *([given] if given else [])])]
+        return [Node(**_of_arguments(executable, _given(values)))]
 
     return LaunchDescription([
         PushLaunchConfigurations(),
-        DeclareLaunchArgument("params_file", default_value=_shared("config", f"{name}.yaml"),
+        DeclareLaunchArgument("params_file", default_value=shared("config", f"{name}.yaml"),
                               description="Parameter file."),
         *(DeclareLaunchArgument(key, default_value="",
                                 description=f"{description}; empty = from the file.")
@@ -73,12 +76,60 @@ def include_driver(name: str, params_file: str, link: Mapping[str, str]) -> Grou
         params_file: Name of its parameter file in config/.
         link: Arguments of the driver, each with the argument of the whole that it follows.
     """
-    arguments = {"params_file": _shared("config", params_file),
+    arguments = {"params_file": shared("config", params_file),
                  **{own: LaunchConfiguration(outer) for own, outer in link.items()}}
     return GroupAction([IncludeLaunchDescription(
-        PythonLaunchDescriptionSource(_shared("launch", f"{name}.launch.py")),
+        PythonLaunchDescriptionSource(shared("launch", f"{name}.launch.py")),
         launch_arguments=arguments.items())])
 
 
-def _shared(*path: str) -> PathJoinSubstitution:
+def describe_managed_driver() -> LaunchDescription:
+    """Return the description that starts one driver, has it configured and then activated.
+
+    The node waits for both transitions, as it does for any lifecycle manager. Its arguments are
+    `driver`, `params_file`, `port`, `name` and `namespace`.
+    """
+    def make_node(context: LaunchContext) -> list[Any]:
+        driver, port = (LaunchConfiguration(key).perform(context) for key in ("driver", "port"))
+        node = LifecycleNode(**_of_arguments(
+            f"{driver}_node", {"autostart": False, **_given({PORTS[driver]: port})}))
+        return [RegisterEventHandler(OnStateTransition(
+            target_lifecycle_node=node, start_state="configuring", goal_state="inactive",
+            entities=[_request(node, Transition.TRANSITION_ACTIVATE)])),
+            node, _request(node, Transition.TRANSITION_CONFIGURE)]
+
+    driver = LaunchConfiguration("driver")
+    return LaunchDescription([
+        PushLaunchConfigurations(),
+        DeclareLaunchArgument("driver", choices=list(PORTS), description="Which one to start."),
+        DeclareLaunchArgument("params_file", default_value=[shared("config", driver), ".yaml"],
+                              description="Parameter file."),
+        DeclareLaunchArgument("port", default_value="", description=(
+            "Serial port or CAN channel; empty = from the file.")),
+        DeclareLaunchArgument("namespace", default_value="", description="Of the node."),
+        DeclareLaunchArgument("name", default_value=driver, description="Of the node."),
+        OpaqueFunction(function=make_node),
+        PopLaunchConfigurations(),
+    ])
+
+
+def _of_arguments(executable: str, values: Mapping[str, object]) -> dict[str, Any]:
+    """Return the options of a node as the arguments say; `values` count more than the file."""
+    return {"package": PACKAGE, "executable": executable, "output": "screen",
+            "name": LaunchConfiguration("name"), "namespace": LaunchConfiguration("namespace"),
+            "parameters": [LaunchConfiguration("params_file"), *([values] if values else [])]}
+
+
+def _given(values: Mapping[str, str]) -> dict[str, ParameterValue]:
+    """Return those that are not empty as texts, also where they look like numbers."""
+    return {key: ParameterValue(value, value_type=str) for key, value in values.items() if value}
+
+
+def _request(node: LifecycleNode, transition: int) -> EmitEvent:
+    return EmitEvent(event=ChangeState(
+        lifecycle_node_matcher=matches_action(node), transition_id=transition))
+
+
+def shared(*path: object) -> PathJoinSubstitution:
+    """Return where a shared file of this package is installed."""
     return PathJoinSubstitution([FindPackageShare(PACKAGE), *path])

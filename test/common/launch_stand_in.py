@@ -10,10 +10,13 @@
 
 Configurations are kept as launch keeps them: an argument that is declared again keeps its value,
 an included file works on those of its includer, Push and Pop save and restore them. What is visited
-is visited depth first. `start` returns the nodes that a launch file would start.
+is visited depth first. `start` returns the nodes that a launch file would start, `launch` all that
+it does: nodes, processes, the transitions that it asks for, and what it does when one is told.
 """
 
 import runpy
+import shlex
+import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -26,9 +29,27 @@ class Context:
         self.launch_configurations = dict(arguments)
         self.stack = []
         self.nodes = []
+        self.commands = []
+        self.requests = []
+        self.handlers = []
 
     def perform(self, what):
+        if isinstance(what, list):
+            return "".join(map(self.perform, what))
         return what.perform(self) if hasattr(what, "perform") else what
+
+    def visit(self, *entities):
+        waiting = list(reversed(entities))
+        while waiting:
+            waiting += reversed(list(waiting.pop().visit(self) or ()))
+
+    def tell(self, node, start_state, goal_state):
+        """Handle the transition of a node, as told by its transition_event."""
+        for handler in self.handlers:
+            wanted = handler.options
+            if (wanted["target_lifecycle_node"] is node and wanted["start_state"] == start_state
+                    and wanted["goal_state"] == goal_state):
+                self.visit(*wanted["entities"])
 
 
 class Entity:
@@ -66,8 +87,10 @@ class PopLaunchConfigurations(Entity):
 class DeclareLaunchArgument(Entity):
     def visit(self, context):
         name, = self.arguments
-        default = context.perform(self.options["default_value"])
-        context.launch_configurations.setdefault(name, default)
+        if name not in context.launch_configurations:  # without a default it must be given
+            context.launch_configurations[name] = context.perform(self.options["default_value"])
+        value = context.launch_configurations[name]
+        assert value in self.options.get("choices", [value])
         return ()
 
 
@@ -90,12 +113,58 @@ class Node(Entity):
         files, values = [], {}
         for each in self.options["parameters"]:
             if isinstance(each, dict):
-                values |= {name: value.arguments[0] for name, value in each.items()}
+                values |= {name: context.perform(value) for name, value in each.items()}
             else:
                 files.append(Path(context.perform(each)).name)
-        context.nodes.append((self.options["executable"], context.perform(self.options["name"]),
-                              context.perform(self.options["namespace"]), files, values))
+        name, namespace = (context.perform(self.options.get(key)) for key in ("name", "namespace"))
+        context.nodes.append((self.options["executable"], name, namespace, files, values))
         return ()
+
+
+class LifecycleNode(Node):
+    """Listens for what it is asked before it starts, so it must be visited before the request."""
+
+    def visit(self, context):
+        context.lifecycle_node = self
+        return super().visit(context)
+
+
+class RegisterEventHandler(Entity):
+    def visit(self, context):
+        context.handlers += self.arguments
+        return ()
+
+
+class EmitEvent(Entity):
+    """The event is a ChangeState; the node that it is for must be there."""
+
+    def visit(self, context):
+        event = self.options["event"].options
+        assert event["lifecycle_node_matcher"](context.lifecycle_node)
+        context.requests.append(event["transition_id"])
+        return ()
+
+
+def matches_action(node):
+    return lambda action: action is node
+
+
+class ExecuteProcess(Entity):
+    def visit(self, context):
+        context.commands.append([context.perform(word) for word in self.options["cmd"]])
+        return ()
+
+
+class ParameterValue(Entity):
+    def perform(self, context):
+        value = context.perform(self.arguments[0])
+        assert isinstance(value, self.options["value_type"])
+        return value
+
+
+class Command(Entity):
+    def perform(self, context):
+        return subprocess.check_output(shlex.split(context.perform(self.arguments[0])), text=True)
 
 
 class LaunchConfiguration(Entity):
@@ -116,13 +185,16 @@ class PathJoinSubstitution(Entity):
 MODULES = {
     "launch": {"LaunchContext": Context, "LaunchDescription": LaunchDescription},
     "launch.actions": {kind.__name__: kind for kind in (
-        DeclareLaunchArgument, GroupAction, IncludeLaunchDescription, OpaqueFunction,
-        PopLaunchConfigurations, PushLaunchConfigurations)},
+        DeclareLaunchArgument, EmitEvent, ExecuteProcess, GroupAction, IncludeLaunchDescription,
+        OpaqueFunction, PopLaunchConfigurations, PushLaunchConfigurations, RegisterEventHandler)},
+    "launch.events": {"matches_action": matches_action},
     "launch.launch_description_sources": {"PythonLaunchDescriptionSource": Entity},
-    "launch.substitutions": {"LaunchConfiguration": LaunchConfiguration,
+    "launch.substitutions": {"Command": Command, "LaunchConfiguration": LaunchConfiguration,
                              "PathJoinSubstitution": PathJoinSubstitution},
-    "launch_ros": {}, "launch_ros.actions": {"Node": Node},
-    "launch_ros.parameter_descriptions": {"ParameterValue": Entity},
+    "launch_ros": {}, "launch_ros.actions": {"LifecycleNode": LifecycleNode, "Node": Node},
+    "launch_ros.event_handlers": {"OnStateTransition": Entity},
+    "launch_ros.events": {}, "launch_ros.events.lifecycle": {"ChangeState": Entity},
+    "launch_ros.parameter_descriptions": {"ParameterValue": ParameterValue},
     "launch_ros.substitutions": {"FindPackageShare": FindPackageShare}}
 
 
@@ -138,10 +210,13 @@ def install(monkeypatch):
     del sys.modules[name]
 
 
+def launch(*entities, **arguments):
+    """Return the context in which the entities were visited."""
+    context = Context(arguments)
+    context.visit(*entities)
+    return context
+
+
 def start(*entities, **arguments):
     """Return executable, name, namespace, parameter files and parameters of each node."""
-    context = Context(arguments)
-    waiting = list(reversed(entities))
-    while waiting:
-        waiting += reversed(list(waiting.pop().visit(context) or ()))
-    return context.nodes
+    return launch(*entities, **arguments).nodes

@@ -299,8 +299,11 @@ class RemoteNode:
 
     def change_state(self, transition):
         """Carry out a transition and return whether it succeeded."""
-        wanted = Transition(id=TRANSITIONS[transition])
-        return self._call(ChangeState, "change_state", transition=wanted).success
+        return self.change_state_by_number(TRANSITIONS[transition])
+
+    def change_state_by_number(self, number):
+        """As change_state, with the number of the transition."""
+        return self._call(ChangeState, "change_state", transition=Transition(id=number)).success
 
     def _call(self, kind, service, **fields):
         if service not in self._clients:

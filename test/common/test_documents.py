@@ -20,7 +20,7 @@ from sensor_tools import document
 ROOT = Path(__file__).resolve().parent.parent.parent
 PARAMETER_FILES = [
     path for path in sorted((ROOT / "config").glob("*.yaml"))
-    if "ros__parameters" in path.read_text()
+    if "/**:" in path.read_text()  # else of other nodes: diagnostic_aggregator
 ]
 DRIVERS = {driver.name: driver for driver in document.DRIVERS}
 
@@ -122,16 +122,6 @@ def test_launch_files_have_arguments(name, link):
     arguments = content["generate_launch_description"]().get_launch_arguments()
     assert {argument.name for argument in arguments} == {
         "params_file", "namespace", "name", *link}
-
-
-def test_rviz_shows_the_points_of_the_radar():
-    text = yaml.safe_load((ROOT / "rviz" / "isys_radar.rviz").read_text())
-    manager = text["Visualization Manager"]
-    (cloud,) = (display for display in manager["Displays"]
-                if display["Class"].endswith("PointCloud2"))
-    assert cloud["Topic"]["Value"] == "/isys_radar/points"
-    assert cloud["Channel Name"] == "radial_velocity"
-    assert manager["Global Options"]["Fixed Frame"] == "isys_radar_link"
 
 
 @pytest.mark.parametrize("path", [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))],

@@ -180,7 +180,9 @@ def test_colcon_takes_it_for_a_ros_package(sources, colcon):
 
 
 @pytest.mark.timeout(180)
-@pytest.mark.parametrize("pattern", ["package.xml", "launch/*.py", "config/*.yaml", "rviz/*.rviz"])
+@pytest.mark.parametrize("pattern", [
+    "package.xml", "launch/*.py", "config/*.yaml", "config/*/*", "layouts/*", "rviz/*.rviz",
+    "urdf/*.xacro"])
 def test_shared_files_are_installed(install, pattern):
     share = install / PACKAGE / "share" / PACKAGE
     wanted = {path.relative_to(ROOT): path.read_bytes() for path in ROOT.glob(pattern)}
