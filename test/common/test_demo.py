@@ -19,6 +19,8 @@ from pathlib import Path
 
 import pytest
 
+from sensor_tools.demo import views
+
 rosbags = pytest.importorskip(
     "rosbags.highlevel", reason="rosbags is not installed; Ubuntu 24.04 has no package of it")
 
@@ -163,6 +165,16 @@ def test_the_bag_is_one_of_jazzy(finished):
     assert digests["sensor_msgs/msg/PointCloud2"] == (
         "RIHS01_9198cabf7da3796ae6fe19c4cb3bdd3525492988c70522628af5daa124bae2b5"
     )
+
+
+def test_each_sensor_has_a_view(finished, tmp_path):
+    demo, *_ = finished
+    views.main([str(demo.directory / "recording"), str(tmp_path / "images")])
+    names = {path.name for path in (ROOT / "docs" / "images").iterdir()}
+    assert {path.name for path in (tmp_path / "images").iterdir()} == names
+    for path in (tmp_path / "images").iterdir():
+        assert path.read_bytes().startswith(PNG)
+        assert 10_000 < path.stat().st_size < 150_000
 
 
 def test_there_is_a_picture(finished):

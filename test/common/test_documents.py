@@ -113,15 +113,19 @@ def test_launch_files_start_what_there_is(name):
     assert (ROOT / "config" / f"{name}.yaml").exists()
 
 
-@pytest.mark.parametrize(("name", "link"), [
-    ("isys_radar", {"serial_port"}), ("uc4000", {"serial_port"}),
-    ("icotronic", {"can_interface", "can_channel"})])
-def test_launch_files_have_arguments(name, link):
+OF_A_NODE = {"params_file", "namespace", "name"}
+
+
+@pytest.mark.parametrize(("name", "wanted"), [
+    ("isys_radar", {*OF_A_NODE, "serial_port"}), ("uc4000", {*OF_A_NODE, "serial_port"}),
+    ("icotronic", {*OF_A_NODE, "can_interface", "can_channel"}),
+    ("lifecycle", {*OF_A_NODE, "driver", "port"}), ("record", {"output", "topics", "qos_file"}),
+    ("diagnostics", {"params_file"}), ("description", {"model"})])
+def test_launch_files_have_arguments(name, wanted):
     pytest.importorskip("launch_ros.actions", reason="launch comes with a sourced ROS only")
     content = runpy.run_path(str(ROOT / "launch" / f"{name}.launch.py"))
     arguments = content["generate_launch_description"]().get_launch_arguments()
-    assert {argument.name for argument in arguments} == {
-        "params_file", "namespace", "name", *link}
+    assert {argument.name for argument in arguments} == wanted
 
 
 @pytest.mark.parametrize("path", [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))],
