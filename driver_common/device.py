@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from driver_common.device_thread import Backoff
-from driver_common.errors import DriverError, RefusedError, SettingError
+from driver_common.errors import DriverError, NoAnswerError, RefusedError, SettingError
 from driver_common.settings import (
     Record,
     RecordAccess,
@@ -108,20 +108,36 @@ class Device:
                 for name, (wanted, reported) in dict(self.differing).items()}
 
     def read_all(self, access: RecordAccess, settings: Mapping[str, Setting], note: Note) -> None:
-        """Read all settings; those that the device refuses to tell are not offered."""
+        """Read all settings; those that the device does not tell are not offered.
+
+        Raises:
+            DriverError: The device is gone, refuses everything, or does not tell what it told
+                before; what was known of it stays as it was.
+        """
         records: dict[Record, list[Setting]] = {}
         for setting in settings.values():
             records.setdefault(setting.record, []).append(setting)
-        self.settings = dict(settings)
-        self.values = {}
+        values: dict[str, Value] = {}
         for group in records.values():
-            try:
-                self.values |= read_settings(access, group)
-            except RefusedError:
-                names = ", ".join(setting.name for setting in group)
-                note(f"this firmware has no {names}", warning=True)
-                for setting in group:
-                    del self.settings[setting.name]
+            values |= self._read_or_nothing(access, group)
+        missing = [name for name in settings if name not in values]
+        self.settings = {name: settings[name] for name in settings if name in values}
+        self.values = {name: values[name] for name in self.settings}
+        if missing:
+            note(f"this firmware has no {', '.join(missing)}", warning=True)
+
+    def _read_or_nothing(self, access: RecordAccess, group: list[Setting]) -> dict[str, Value]:
+        """Read settings; return nothing where just these are refused or not answered."""
+        try:
+            return read_settings(access, group)
+        except (RefusedError, NoAnswerError):
+            access.require_answer()
+        try:
+            return read_settings(access, group)
+        except (RefusedError, NoAnswerError):
+            if any(setting.name in self.values for setting in group):
+                raise
+            return {}
 
     def write(self, access: RecordAccess, changes: Mapping[str, Value]) -> dict[str, Value]:
         """Write settings, all or none, and return what the device reports; see `write_settings`."""

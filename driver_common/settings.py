@@ -346,6 +346,9 @@ class RecordAccess(Protocol):
     def write_record(self, record: Record, values: tuple[Raw, ...]) -> None:
         """Write all fields of a record; raises RefusedError where the device refuses."""
 
+    def require_answer(self) -> None:
+        """Ask what every such device answers; raises DriverError where this one does not now."""
+
 
 def suggestion(word: str, known: Iterable[str]) -> str:
     """Return '; did you mean "…"?' for the nearest known word, else ""."""

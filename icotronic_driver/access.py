@@ -116,6 +116,10 @@ class Access:
         for request in record.write_requests(STH_1, values):
             self.request(request)
 
+    def require_answer(self) -> None:
+        """Ask who the sensor is."""
+        self.read_name_and_mac(STH_1)
+
     # --- EEPROM ---
 
     def read_field(self, node: int, field: Field) -> FieldValue:
@@ -171,6 +175,9 @@ class Survey(Access):
             self._silent.add(kind)
             self._patience -= wait
             raise RefusedError(missing) from error
+
+    def require_answer(self) -> None:
+        """Let it be: how often it is silent is counted already."""
 
     def identify(self, node: int) -> UnitIdentity:
         """Return who a node is; raises NoAnswerError where it does not even tell its name."""

@@ -211,6 +211,7 @@ class Connection:
         name, mac = survey.read_name_and_mac(STH_1)
         if mac != sensor.target.mac:
             raise WrongDeviceError(f'instead of {sensor.target} "{name}" ({mac}) was connected')
+        sensor.values = {}
         sensor.read_all(survey, SETTINGS, _say_nothing)
         sensor.identity = survey.identify(STH_1)
         sensor.stu_identity = survey.identify(STU_1)

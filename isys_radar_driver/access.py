@@ -132,3 +132,6 @@ class _Records:
     def write_record(self, record: Record, values: tuple[Raw, ...]) -> None:
         assert isinstance(record, IsysRecord)
         self._access.write_record(self._radar, record, values, self._location)
+
+    def require_answer(self) -> None:
+        self._access.execute(self._radar, commands.READ_DEVICE_NAME)

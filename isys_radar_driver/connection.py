@@ -109,6 +109,7 @@ class Connection:
         if self._guesses_baud_rate:
             self._line.link.baud_rate = identity.model.baud_rate
         radar.identity = identity
+        radar.values = {}  # it may be another one
         radar.baud_rate = self._line.link.baud_rate
         self._configure(radar)
 

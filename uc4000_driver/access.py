@@ -16,7 +16,7 @@ from typing import TypeVar
 from driver_common import advice
 from driver_common.errors import FrameError, NoAnswerError, RefusedError
 from driver_common.settings import UNKNOWN, Raw, Record
-from uc4000_driver.commands import Command, Uc4000Record
+from uc4000_driver.commands import READ_ADDRESS, Command, Uc4000Record
 from uc4000_driver.line import (
     Answer,
     DamagedRequestError,
@@ -75,6 +75,10 @@ class Access:
         if record.write_only:
             return (self._sensor.acknowledged.get(record.name, UNKNOWN),)
         return (self.execute(record.read()),)
+
+    def require_answer(self) -> None:
+        """Ask for the address; raises DriverError."""
+        self.execute(READ_ADDRESS)
 
     def write_record(self, record: Record, values: tuple[Raw, ...]) -> None:
         """Write a record; raises RefusedError where the sensor stores something else."""

@@ -52,6 +52,7 @@ class Connection:
             sensor.address = self._ask_address()
         self.check_address(sensor, attempts=1)
         sensor.identity = self.identify(sensor)
+        sensor.values = {}  # it may be another one
         try:
             self._read_all(sensor)
             self._make_as_wanted(sensor)
@@ -77,12 +78,8 @@ class Connection:
     def look_again(self, sensor: Sensor) -> None:
         """Look after a silence whether the sensor is as it was: it may have lost its settings."""
         self.check_address(sensor, attempts=1)
-        settings, before = sensor.settings, sensor.values
-        try:
-            self._read_all(sensor)
-        except DriverError:
-            sensor.settings, sensor.values = settings, before
-            raise
+        before = sensor.values
+        self._read_all(sensor)
         if sensor.values != before:
             sensor.acknowledged.clear()  # it must be taken for lost as well
             self._read_all(sensor)

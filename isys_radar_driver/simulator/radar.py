@@ -82,8 +82,15 @@ _NONSENSE: Sequence[Callable[[TargetList], TargetList]] = (
 )
 
 
+OPTIONAL = ("led", "frequency_channel")  # settings without which a radar measures as well
+
+
 class Refusal(Exception):  # noqa: N818
     """The radar answers with a failure."""
+
+
+class Silence(Exception):  # noqa: N818
+    """The radar does not answer."""
 
 
 class SimulatedRadar:
@@ -186,6 +193,8 @@ class SimulatedRadar:
                 delimiter = self._delimiter(request)
             pdu = handler(self, request.pdu, due)
             function_code = request.function_code
+        except Silence:
+            return None
         except (Refusal, struct.error, IndexError):
             pdu, function_code, delimiter = b"", FAILURE, Delimiter.SD2
         return due, Frame(MASTER, self.address, function_code, pdu, delimiter)
@@ -259,6 +268,8 @@ class SimulatedRadar:
         record, location, rest = self._find_record(function_code, pdu)
         if rest:
             raise Refusal
+        if self.bare and any(setting.name in OPTIONAL for setting in self._fields[record].values()):
+            raise Silence
         store = self.eeprom if location is Location.EEPROM else self.ram
         repeats = record.has_location and record.sub_function >> 8 == 0x07  # errata I14
         prefix = bytes((location,)) + record.selector if repeats else b""

@@ -17,6 +17,7 @@ from typing import Any
 
 import pytest
 
+from driver_common.device import Device, DeviceOptions
 from driver_common.errors import NoAnswerError, RefusedError, SettingError
 from driver_common.settings import (
     Option,
@@ -253,12 +254,19 @@ class FakeDevice:
         1: (100, 200), 2: (10,), 3: (50,), 4: (0.5,), 5: (4711,)})
     log: list[tuple[str, int]] = field(default_factory=list)
     refused: set[int] = field(default_factory=set)  # numbers that it never takes
+    secret: set[int] = field(default_factory=set)  # numbers that it does not tell
+    silent: set[int] = field(default_factory=set)  # numbers that it does not answer
+    gone: bool = False
     lost: set[int] = field(default_factory=set)  # numbers whose acknowledge is lost once
     forgets: set[int] = field(default_factory=set)  # numbers that it takes and does not keep
 
     def read_record(self, record: Record) -> tuple[Raw, ...]:
         assert isinstance(record, Numbered)
         self.log.append(("read", record.number))
+        if self.gone or record.number in self.silent:
+            raise NoAnswerError("no answer")
+        if record.number in self.secret:
+            raise RefusedError("the device refused")
         return record.unpack(record.pack(self.raw[record.number]))
 
     def write_record(self, record: Record, values: tuple[Raw, ...]) -> None:
@@ -272,6 +280,10 @@ class FakeDevice:
             self.raw = after
         if number in self.lost:
             self.lost.remove(number)
+            raise NoAnswerError("no answer")
+
+    def require_answer(self) -> None:
+        if self.gone:
             raise NoAnswerError("no answer")
 
     @property
@@ -290,6 +302,49 @@ def test_reading_asks_for_nothing_else() -> None:
     device = FakeDevice()
     assert read_settings(device, [SETTINGS["high"]]) == {"high": 5.0}
     assert device.log == [("read", 3)]
+
+
+@pytest.fixture
+def notes() -> list[str]:
+    return []
+
+
+@pytest.fixture
+def read_all(notes: list[str]) -> Any:
+    """Read all settings of a device; return what is known of it."""
+    known = Device(DeviceOptions())
+
+    def read(device: FakeDevice) -> Device:
+        known.read_all(device, SETTINGS, lambda text, warning=False: notes.append(text))
+        return known
+
+    return read
+
+
+@pytest.mark.parametrize("device", [FakeDevice(secret={2, 4}), FakeDevice(silent={2, 4})])
+def test_what_a_device_does_not_tell_is_left_out_and_told_once(
+        read_all: Any, notes: list[str], device: FakeDevice) -> None:
+    known = read_all(device)
+    assert known.values == {"left": 10.0, "right": 20.0, "high": 5.0, "serial_number": 4711}
+    assert known.settings.keys() == known.values.keys()
+    assert notes == ["this firmware has no low, scale"]
+
+
+def test_a_device_that_is_gone_lacks_nothing(read_all: Any, notes: list[str]) -> None:
+    with pytest.raises(NoAnswerError):
+        read_all(FakeDevice(gone=True))
+    assert notes == []
+
+
+@pytest.mark.parametrize("device", [FakeDevice(secret={2}), FakeDevice(silent={2}),
+                                    FakeDevice(gone=True)])
+def test_what_was_told_once_is_not_missing(
+        read_all: Any, notes: list[str], device: FakeDevice) -> None:
+    before = dict(read_all(FakeDevice()).values)
+    with pytest.raises((RefusedError, NoAnswerError)):
+        read_all(device)
+    known = read_all(FakeDevice())
+    assert (known.values, notes) == (before, [])
 
 
 def test_writing_returns_what_the_device_reports() -> None:

@@ -153,7 +153,7 @@ def test_a_radar_that_cannot_be_configured_again_is_found_anew(self_starting):
     master, line, simulated = self_starting
     master.radar.check_due = 0.0
     simulated.power_cycle(now=-math.inf)
-    get_through = iter([True, False, False])  # the check that shows the reset, then both attempts
+    get_through = iter([True, *[False] * 4])  # the check that shows the reset, then every attempt
     line.faults = Script(lambda due, reply: (
         [(due, reply)] if function_code(reply) != commands.READ_APPLICATION
         or next(get_through, True) else []))

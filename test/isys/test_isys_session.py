@@ -210,6 +210,19 @@ def test_old_firmware_may_lack_a_version_and_a_setting(start):
     assert any("led" in note for note in master.heard.notes)
 
 
+def test_what_a_radar_told_once_is_not_missing_because_it_refuses_for_a_while(start):
+    line, simulated = start("iSYS-4001")
+    master = Master(line.port).find()
+    told = dict(master.radar.values)
+    assert "led" in told
+    simulated.refuse = {0xD2, 0xD5}
+    with pytest.raises(RefusedError):
+        master.bus.connection.read_all(master.radar)
+    assert master.radar.values == told
+    assert master.radar.settings.keys() == told.keys()
+    assert master.heard.warnings == []
+
+
 def test_firmware_before_1_310_has_four_frequency_channels(start):
     line, simulated = start("iSYS-4001")
     reply = simulated.reply
@@ -817,6 +830,8 @@ def test_a_radar_that_is_silent_on_what_is_optional_is_used(start, monkeypatch):
     master = Master(line.port).find()
     identity = master.radar.identity
     assert (identity.dsp_hardware, identity.rfe_hardware, identity.bootloader) == (None,) * 3
+    assert master.heard.warnings == ["this firmware has no frequency_channel"]
+    assert "frequency_channel" not in master.radar.settings
     requests = counted_requests(simulated)
     master.bus.set_active(True)
     master.until(lambda: master.radar.absent == {"dsp", "rfe"})
