@@ -10,16 +10,25 @@
 
 from __future__ import annotations
 
+import functools
+import threading
 from collections import Counter
 from typing import NamedTuple
 
 import pytest
-from nodes import NodeProcess, Ros
-from sensor_msgs.msg import PointCloud2, Range
+from nodes import DEADLINE, NodeProcess, Ros
+from rclpy.serialization import deserialize_message
+from rclpy.time import Time
+from sensor_msgs.msg import Imu, PointCloud2, Range
 
+from driver_common.device_thread import DeviceThread
 from driver_common.flight_recorder import Kind, frame_of
 from driver_common.recording import CAN, SERIAL, read_recording
 from icotronic_driver.line import STREAM_ID
+from sensor_tools.families import FAMILIES
+from sensor_tools.messages import CONVERSIONS
+from sensor_tools.search.place import CanPlace, SerialPlace
+from sensor_tools.search.result import Found
 from uc4000_driver.simulator.line import simulated_line
 
 
@@ -209,6 +218,43 @@ def test_a_recording_gives_the_same_messages(ros, home, driver):
     assert replayed == wanted[:len(replayed)]
     assert f"playing {path} of /original" in process.log
     assert "this node asks" not in process.log
+
+
+# Each driver with the topic that `sensors record` writes, and the address of no certain sensor.
+RECORDED = [
+    (DRIVERS[0], "isys", "0"),
+    (DRIVERS[1], "uc4000", "0"),
+    (DRIVERS[2]._replace(topic="imu/data_raw", kind=Imu), "icotronic", "")]
+
+
+@pytest.mark.parametrize(("driver", "family", "address"), RECORDED,
+                         ids=[driver.name for driver, *_ in RECORDED])
+def test_the_command_records_the_messages_of_the_node(ros, home, driver, family, address):
+    def save(process, node, messages):
+        ros.wait_until(lambda: len(messages) > 60)
+        assert node.trigger("save_recording").success
+
+    wanted, _ = run(ros, driver, driver.parameters, driver.name, save)
+    (path,) = logs(home, "request")
+    place = SerialPlace(f"replay://{path}") if driver.link == SERIAL else CanPlace(
+        str(path), "replay")
+    recorded, ended = {}, threading.Event()
+    convert = functools.cache(lambda: CONVERSIONS[family](bus.devices[0]))
+    bus = FAMILIES[family].make_bus(
+        Found(family, place, "", address, 0),
+        lambda *measured: recorded.update({one.time: one for one in convert()(*measured)}), {})
+    bus.line.recorder.clock.rate = 0.0
+    thread = DeviceThread("bus", bus, lambda error: error and ended.set())
+    thread.post(lambda: bus.set_active(True))
+    thread.start()
+    assert ended.wait(DEADLINE)
+    thread.stop()
+    both = [(message, recorded[stamp]) for message in wanted
+            if (stamp := Time.from_msg(message.header.stamp).nanoseconds) in recorded]
+    assert len(both) > 50
+    for message, record in both:
+        assert record.topic == f"/{driver.name}/{driver.topic}"
+        assert deserialize_message(record.data, driver.kind) == message
 
 
 def test_other_parameters_than_recorded_are_said_once(ros, home):
