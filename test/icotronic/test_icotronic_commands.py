@@ -16,8 +16,8 @@ import re
 from typing import Any
 
 import pytest
-from icotronic_examples import ERRORS, EXAMPLES, SETTINGS, STH, STU, Example, SettingExample
 
+from bench.examples.icotronic import ERRORS, EXAMPLES, SETTINGS, STH, STU, Example, SettingExample
 from driver_common.errors import FrameError, RefusedError, SettingError
 from driver_common.settings import read_settings, write_settings
 from icotronic_driver import commands

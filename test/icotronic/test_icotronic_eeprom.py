@@ -14,8 +14,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import pytest
-from icotronic_examples import STH_FIELDS, STU_FIELDS, FieldExample
 
+from bench.examples.icotronic import STH_FIELDS, STU_FIELDS, FieldExample
 from driver_common.errors import FrameError, SettingError
 from icotronic_driver.eeprom import (
     PAGE_NAMES,

@@ -22,9 +22,9 @@ from typing import Any, TypeVar
 import can
 import numpy as np
 import pytest
-from icotronic_examples import EXAMPLES, SELF, STH, STU, Example
 from test_icotronic_commands import request_of
 
+from bench.examples.icotronic import EXAMPLES, SELF, STH, STU, Example
 from driver_common.errors import (
     DriverError,
     LinkError,

@@ -16,8 +16,8 @@ from collections.abc import Iterable
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from isys_examples import EXAMPLES, HAND_TYPED, Example, Targets
 
+from bench.examples.isys import EXAMPLES, HAND_TYPED, Example, Targets
 from isys_radar_driver.frames import Delimiter, Frame, FrameParser
 
 REPLY = bytes.fromhex("68 05 05 68 01 80 D2 00 80 D3 16")  # table 7 of the manual

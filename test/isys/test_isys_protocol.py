@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from isys_examples import (
+
+from bench.examples.isys import (
     EEPROM,
     EXAMPLES,
     HAND_TYPED,
@@ -36,7 +37,6 @@ from isys_examples import (
     Values,
     Write,
 )
-
 from driver_common.errors import FrameError, SettingError
 from driver_common.settings import Raw, Setting
 from isys_radar_driver import commands
