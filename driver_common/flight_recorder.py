@@ -218,7 +218,7 @@ class FlightRecorder:
         if chunk.begin < self._search_end:
             self._keep(chunk)
         oldest = now - int((DURATION + CHUNK_TIME) * 1e9)
-        while self._size > MEMORY or self._chunks[0].begin < oldest:
+        while len(self._chunks) > 1 and (self._size > MEMORY or self._chunks[0].begin < oldest):
             self._size -= len(self._chunks.popleft().data)
 
     def _keep(self, chunk: _Chunk) -> None:

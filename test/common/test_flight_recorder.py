@@ -107,6 +107,14 @@ def test_the_offset_between_the_clocks_is_kept_where_it_changes(recorder):
     assert [entry.offset for entry in unpack(parts)] == [OFFSET, OFFSET + 5]
 
 
+def test_after_a_host_that_slept_the_newest_is_there(recorder, clock):
+    fill(recorder, clock, 5)
+    clock.now += 3600 * SECOND
+    recorder.add(clock.now, Kind.RECEIVED, b"awake")
+    recorder.add(clock.now + 1, Kind.RECEIVED, b"again")
+    assert [entry.content for entry in entries(recorder)][-2:] == [b"awake", b"again"]
+
+
 def test_the_last_minute_is_kept_and_not_much_more(recorder, clock):
     fill(recorder, clock, 200)
     times = [entry.time for entry in entries(recorder)]
