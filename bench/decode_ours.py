@@ -16,8 +16,9 @@ import time
 from collections.abc import Callable
 
 from icotronic_driver.line import Line
+from icotronic_driver.listener import Listener
 from icotronic_driver.sensor import Options, Sensor
-from icotronic_driver.session import IcotronicBus, Listener
+from icotronic_driver.session import IcotronicBus
 
 
 class Counter(Listener):

@@ -13,7 +13,6 @@ from __future__ import annotations
 import contextlib
 import itertools
 from collections.abc import Callable, Iterator, Mapping
-from typing import TYPE_CHECKING
 
 from driver_common import clocks as time
 from driver_common.errors import DriverError, FrameError, NoAnswerError, RefusedError
@@ -24,13 +23,11 @@ from icotronic_driver.access import READINGS, Access, Survey
 from icotronic_driver.identifier import STH_1
 from icotronic_driver.laws import DEVICE
 from icotronic_driver.line import Line
+from icotronic_driver.listener import Listener
 from icotronic_driver.reception import Reception
 from icotronic_driver.sensor import Phase, Sensor
 from icotronic_driver.settings import SETTINGS, nearest_adc_configuration
 from icotronic_driver.streaming import StreamDecoder
-
-if TYPE_CHECKING:
-    from icotronic_driver.session import Listener
 
 LISTEN_TIME = 0.05  # s that jobs of others wait at most
 KEEP_ALIVE = 1.0  # s between checks of a connection without a stream

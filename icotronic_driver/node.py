@@ -44,9 +44,10 @@ from icotronic_driver.laws import (
     Law,
 )
 from icotronic_driver.line import Line
+from icotronic_driver.listener import Listener
 from icotronic_driver.maintenance import STORED
 from icotronic_driver.sensor import Channel, Options, Phase, Sensor, UnitIdentity
-from icotronic_driver.session import IcotronicBus, Listener
+from icotronic_driver.session import IcotronicBus
 from icotronic_driver.settings import SETTINGS
 from icotronic_driver.streaming import AXES
 from icotronic_driver.values import CLOCK, decode_mac, encode_mac

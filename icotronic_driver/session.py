@@ -16,10 +16,9 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
 
-from driver_common import device_bus
 from driver_common.device_bus import DeviceBus
 from driver_common.errors import DriverError, NoAnswerError
 from driver_common.settings import Value
@@ -27,23 +26,9 @@ from icotronic_driver.access import Access
 from icotronic_driver.acquisition import Acquisition
 from icotronic_driver.connection import Connection
 from icotronic_driver.line import Line
+from icotronic_driver.listener import Listener
 from icotronic_driver.maintenance import Maintenance
 from icotronic_driver.sensor import Options, Phase, Sensor
-
-
-class Listener(device_bus.Listener[Sensor]):
-    """What a user of the bus wants to hear; all called in the thread of the bus."""
-
-    def on_stream(self, sensor: Sensor) -> Callable[[int, float, tuple[int, ...]], None]:
-        """Return what takes the samples of a stream that begins.
-
-        It is called for each data frame with the time of the first sample in ns, the time between
-        two samples in ns, and the raw values, oldest first.
-        """
-        raise NotImplementedError
-
-    def on_readings(self, sensor: Sensor, name: str) -> None:
-        """Tell that one of the sensor's readings is new."""
 
 
 class IcotronicBus(DeviceBus[Sensor]):

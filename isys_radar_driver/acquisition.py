@@ -13,7 +13,6 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from driver_common import clocks as time
 from driver_common.errors import FrameError, RefusedError
@@ -22,12 +21,10 @@ from isys_radar_driver import commands
 from isys_radar_driver.access import Access
 from isys_radar_driver.frames import READ_TARGET_LIST, Frame
 from isys_radar_driver.line import LATENCY
+from isys_radar_driver.listener import Listener
 from isys_radar_driver.plausibility import MEMORY_CYCLES, SHORT_MEMORY
 from isys_radar_driver.radar import Radar
 from isys_radar_driver.targets import Resolution, TargetList, decode_target_list
-
-if TYPE_CHECKING:
-    from isys_radar_driver.session import Listener
 
 NEWS_TIME = 1.0  # s after a list; later the next one is taken if it is possible at all
 REALIGN_PERIOD = 30.0  # s between restarts of a radar that is out of its turn

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
 from driver_common import advice
 from driver_common import clocks as time
@@ -29,12 +28,10 @@ from isys_radar_driver.access import ATTEMPTS, Access
 from isys_radar_driver.acquisition import Acquisition
 from isys_radar_driver.commands import Location
 from isys_radar_driver.frames import BROADCAST
+from isys_radar_driver.listener import Listener
 from isys_radar_driver.models import BAUD_RATES, RANGE_BOUND, model_of_product
 from isys_radar_driver.radar import Identity, Radar
 from isys_radar_driver.settings import record_of, settings_of
-
-if TYPE_CHECKING:
-    from isys_radar_driver.session import Listener
 
 BOARD_TEMPERATURES = {"dsp": commands.READ_DSP_TEMPERATURE, "rfe": commands.READ_RFE_TEMPERATURE}
 EXPLAIN_AFTER = 3.0  # s without a radar after which it is worth the time to look for the reason

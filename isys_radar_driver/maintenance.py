@@ -11,7 +11,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from driver_common.errors import (
     DriverError,
@@ -28,12 +28,10 @@ from isys_radar_driver.commands import Command, IsysRecord, Location, RawSignals
 from isys_radar_driver.connection import Connection
 from isys_radar_driver.frames import FIRST_ADDRESS, LAST_ADDRESS
 from isys_radar_driver.line import REPLY_TIMEOUT
+from isys_radar_driver.listener import Listener
 from isys_radar_driver.models import Model
 from isys_radar_driver.radar import Radar
 from isys_radar_driver.settings import is_application_setting, record_of
-
-if TYPE_CHECKING:
-    from isys_radar_driver.session import Listener
 
 T = TypeVar("T")
 

@@ -26,9 +26,10 @@ from driver_common.device_node import FRAME_ID, TIME_OFFSET, DeviceNode, Topic, 
 from driver_common.settings import Option, Value
 from isys_radar_driver import commands
 from isys_radar_driver.commands import Command, RangeList
+from isys_radar_driver.listener import Listener
 from isys_radar_driver.models import find_model
 from isys_radar_driver.radar import Options, Radar
-from isys_radar_driver.session import Listener, RadarBus
+from isys_radar_driver.session import RadarBus
 from isys_radar_driver.settings import ALL_SETTINGS
 from isys_radar_driver.targets import TargetList
 from msg_conversions.multi_array import to_float32_multi_array

@@ -18,7 +18,6 @@ import contextlib
 from collections.abc import Iterable, Mapping
 
 from driver_common import clocks as time
-from driver_common import device_bus
 from driver_common.device_bus import DeviceBus
 from driver_common.errors import (
     DriverError,
@@ -31,32 +30,14 @@ from driver_common.errors import (
 from driver_common.settings import Value
 from isys_radar_driver.access import Access
 from isys_radar_driver.acquisition import Acquisition
-from isys_radar_driver.commands import RangeList
 from isys_radar_driver.connection import Connection
 from isys_radar_driver.frames import BROADCAST
 from isys_radar_driver.line import Line
+from isys_radar_driver.listener import Listener
 from isys_radar_driver.maintenance import Maintenance
 from isys_radar_driver.radar import Options, Radar
-from isys_radar_driver.targets import TargetList
 
 PATIENCE = 5.0  # s since a good step for which a radar with a bad line is not lost
-
-
-class Listener(device_bus.Listener[Radar]):
-    """What a user of the bus wants to hear; all called in the thread of the bus."""
-
-    def on_target_list(self, radar: Radar, targets: TargetList, stamp: int) -> None:
-        """Take a target list; `stamp` is the host's time in ns when the reply began."""
-
-    def on_digital_outputs(self, radar: Radar, values: tuple[int, ...], stamp: int) -> None:
-        """Take the state of the digital outputs."""
-
-    def on_range_list(self, radar: Radar, values: RangeList, targets: TargetList,
-                      stamp: int) -> None:
-        """Take a range list, and the target list that came before it."""
-
-    def on_temperatures(self, radar: Radar, stamp: int) -> None:
-        """Tell that the board temperatures of a radar were read."""
 
 
 class RadarBus(DeviceBus[Radar]):

@@ -18,12 +18,12 @@ from typing import TypeAlias
 
 import numpy as np
 
+from icotronic_driver.listener import Listener as StreamListener
 from icotronic_driver.sensor import Channel, Sensor
-from icotronic_driver.session import Listener as StreamListener
+from isys_radar_driver.listener import Listener as TargetListener
 from isys_radar_driver.radar import Radar
-from isys_radar_driver.session import Listener as TargetListener
 from isys_radar_driver.targets import TargetList
-from uc4000_driver.acquisition import Listener as DistanceListener
+from uc4000_driver.listener import Listener as DistanceListener
 from uc4000_driver.sensor import Measurement
 from uc4000_driver.sensor import Sensor as Ultrasonic
 

@@ -14,7 +14,6 @@ from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 
 from driver_common import clocks as time
-from driver_common import device_bus
 from driver_common.device_thread import Backoff
 from driver_common.errors import FrameError, NoAnswerError, RefusedError, SettingError
 from driver_common.settings import suggestion
@@ -30,6 +29,7 @@ from uc4000_driver.exchange import (
     stagger,
 )
 from uc4000_driver.line import Answer, Line
+from uc4000_driver.listener import Listener
 from uc4000_driver.sensor import Measurement, Sensor
 from uc4000_driver.telegram import GAP
 
@@ -38,16 +38,6 @@ RECENT = 20  # sets by which a group is judged
 CALM = 100  # sets without a failure after which a group tries again whether it can be quicker
 NOTEWORTHY = 0.1  # share of failing sets
 OPERATING_TEMPERATURE = (-25, 70)  # °C, section 2.1
-
-
-class Listener(device_bus.Listener[Sensor]):
-    """What a user of the bus wants to hear; all called in the thread of the bus."""
-
-    def on_measurement(self, sensor: Sensor, measurement: Measurement) -> None:
-        """Take a measurement."""
-
-    def on_temperature(self, sensor: Sensor, celsius: float, stamp: int) -> None:
-        """Take a temperature; `stamp` is the host's time in ns when it was asked for."""
 
 
 class Group:

@@ -30,9 +30,10 @@ from msg_conversions.range import (
     to_range,
 )
 from msg_conversions.temperature import to_temperature
-from uc4000_driver.acquisition import OPERATING_TEMPERATURE, Listener
+from uc4000_driver.acquisition import OPERATING_TEMPERATURE
 from uc4000_driver.commands import MAX_CYCLES, PROFILES, Outcome
 from uc4000_driver.line import ECHO_CHOICES
+from uc4000_driver.listener import Listener
 from uc4000_driver.sensor import FIELD_OF_VIEW, Measurement, Options, Sensor
 from uc4000_driver.session import Uc4000Bus
 from uc4000_driver.settings import ALL_SETTINGS

@@ -19,17 +19,16 @@ from driver_common import clocks as time
 from driver_common.device_bus import DeviceBus
 from driver_common.errors import DriverError, FrameError, NoAnswerError, RefusedError, SettingError
 from driver_common.settings import Value
-from uc4000_driver.acquisition import Acquisition, Listener, make_groups
+from uc4000_driver.acquisition import Acquisition, make_groups
 from uc4000_driver.connection import Connection
 from uc4000_driver.line import Line
+from uc4000_driver.listener import Listener
 from uc4000_driver.maintenance import Maintenance
 from uc4000_driver.sensor import Options, Sensor
 from uc4000_driver.telegram import CAST, FIRST_ADDRESS, LAST_ADDRESS
 
 DAMAGES_UNTIL_LOST = 10  # in a row; interference alone does not do that
 KEEP_ALIVE = 1.0  # s between requests to a sensor that is not measuring
-
-__all__ = ["Listener", "Uc4000Bus"]
 
 
 class Uc4000Bus(DeviceBus[Sensor]):

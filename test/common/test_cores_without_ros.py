@@ -115,7 +115,8 @@ else:
 RADAR_SESSION = """
 import time
 from isys_radar_driver.radar import Options
-from isys_radar_driver.session import Listener, RadarBus
+from isys_radar_driver.listener import Listener
+from isys_radar_driver.session import RadarBus
 from isys_radar_driver.simulator.line import simulated_line
 
 class Printer(Listener):

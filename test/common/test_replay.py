@@ -31,13 +31,16 @@ from driver_common.flight_recorder import (
 from driver_common.recording import CAN, SERIAL, RecordingText
 from driver_common.replayed_can import can_recorder, open_can
 from driver_common.replayed_serial import open_serial, serial_recorder
+from icotronic_driver import listener as icotronic_listener
 from icotronic_driver import session as icotronic
 from icotronic_driver.line import Line as IcotronicLine
 from icotronic_driver.sensor import Options as IcotronicOptions
 from icotronic_driver.simulator.line import simulated_network
+from isys_radar_driver import listener as isys_listener
 from isys_radar_driver import session as isys
 from isys_radar_driver.radar import Options as RadarOptions
 from isys_radar_driver.simulator.line import simulated_line as simulated_radars
+from uc4000_driver import listener as uc4000_listener
 from uc4000_driver import session as uc4000
 from uc4000_driver.sensor import Options as Uc4000Options
 from uc4000_driver.simulator.line import simulated_line as simulated_sensors
@@ -74,7 +77,7 @@ class Heard(device_bus.Listener):
             self.done.set()
 
 
-class HeardRadars(Heard, isys.Listener):
+class HeardRadars(Heard, isys_listener.Listener):
     def on_target_list(self, radar, targets, stamp):
         self.tell("targets", targets, stamp)
 
@@ -82,7 +85,7 @@ class HeardRadars(Heard, isys.Listener):
         self.tell("range", values, stamp)
 
 
-class HeardUltrasonic(Heard, uc4000.Listener):
+class HeardUltrasonic(Heard, uc4000_listener.Listener):
     def on_measurement(self, sensor, measurement):
         self.tell("measurement", str(sensor), measurement)
 
@@ -90,7 +93,7 @@ class HeardUltrasonic(Heard, uc4000.Listener):
         self.tell("temperature", celsius, stamp)
 
 
-class HeardIcotronic(Heard, icotronic.Listener):
+class HeardIcotronic(Heard, icotronic_listener.Listener):
     bus = None
 
     def on_stream(self, sensor):

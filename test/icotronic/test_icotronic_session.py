@@ -47,8 +47,9 @@ from icotronic_driver.eeprom import STH_EEPROM, STU_EEPROM, Status
 from icotronic_driver.identifier import SPU_1, STH_1, STU_1, Identifier
 from icotronic_driver.laws import STANDARD_GRAVITY, ChannelOptions, Law
 from icotronic_driver.line import STREAM_ID, Line
+from icotronic_driver.listener import Listener
 from icotronic_driver.sensor import Options, Phase
-from icotronic_driver.session import IcotronicBus, Listener
+from icotronic_driver.session import IcotronicBus
 from icotronic_driver.settings import SETTINGS
 from icotronic_driver.simulator import line, scene, sth, stu, unit
 from icotronic_driver.simulator.line import SimulatedIcotronic, simulated_network

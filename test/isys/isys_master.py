@@ -22,9 +22,10 @@ from bus_master import BusMaster, BusRecorder
 
 from driver_common.simulator.line import Faults
 from isys_radar_driver.frames import FrameParser
+from isys_radar_driver.listener import Listener
 from isys_radar_driver.models import find_model
 from isys_radar_driver.radar import Options
-from isys_radar_driver.session import Listener, RadarBus
+from isys_radar_driver.session import RadarBus
 from isys_radar_driver.simulator import radar as simulated_radar
 from isys_radar_driver.simulator.line import simulated_line
 

@@ -27,10 +27,11 @@ from std_msgs.msg import Bool, Float32MultiArray
 from driver_common import diagnostics
 from isys_radar_driver.commands import READ_APPLICATION, Location
 from isys_radar_driver.frames import READ_TARGET_LIST
+from isys_radar_driver.listener import Listener
 from isys_radar_driver.models import find_model
 from isys_radar_driver.node import IsysRadarNode
 from isys_radar_driver.radar import Identity, Options, Radar
-from isys_radar_driver.session import Listener, RadarBus
+from isys_radar_driver.session import RadarBus
 from isys_radar_driver.targets import Target
 
 MODULE = "isys_radar_driver.node"

@@ -20,8 +20,9 @@ from driver_common.errors import SettingError
 from uc4000_driver.acquisition import CALM, Group
 from uc4000_driver.commands import OpCode
 from uc4000_driver.exchange import ADAPTER_LATENCY, most_together
+from uc4000_driver.listener import Listener
 from uc4000_driver.sensor import Options
-from uc4000_driver.session import Listener, Uc4000Bus
+from uc4000_driver.session import Uc4000Bus
 from uc4000_driver.telegram import ErrorCode, Reply, Request
 
 

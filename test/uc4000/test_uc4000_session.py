@@ -30,8 +30,9 @@ from driver_common.errors import (
 )
 from uc4000_driver import session
 from uc4000_driver.commands import OpCode, Outcome
+from uc4000_driver.listener import Listener
 from uc4000_driver.sensor import Options
-from uc4000_driver.session import Listener, Uc4000Bus
+from uc4000_driver.session import Uc4000Bus
 from uc4000_driver.simulator.scene import EMPTY, FULL, filling
 from uc4000_driver.telegram import ErrorCode
 

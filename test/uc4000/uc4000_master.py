@@ -16,8 +16,9 @@ from __future__ import annotations
 
 from bus_master import BusMaster, BusRecorder
 
+from uc4000_driver.listener import Listener
 from uc4000_driver.sensor import Options
-from uc4000_driver.session import Listener, Uc4000Bus
+from uc4000_driver.session import Uc4000Bus
 
 
 class Recorder(BusRecorder, Listener):
