@@ -36,10 +36,12 @@ FAULTS = {
     "jitter": "time in s by which such a frame comes late, at most",
     "burst": "time in s for which such frames are held back, to come all at once",
     "answer_loss": "probability that an answer of a sensor is lost",
+    "answer_delay": "time in s that an answer of a sensor takes beyond the usual",
     "refused_connects": "how many attempts to connect fail",
     "connect_time": "time in s that a connection takes beyond the shortest",
     "newness": "time in s in which a new sensor tells no MAC address, no RSSI and half a name",
-    "foreign": "frames per s on the bus that belong to something else"}
+    "foreign": "frames per s on the bus that belong to something else",
+    "errors": "error frames per s on the bus"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -85,7 +87,7 @@ def open_simulation(options: argparse.Namespace) -> Simulation:
         network.sensor(name).in_range = True
 
     def power_cycle(name: str) -> None:
-        network.power_loss(network.sensor(name))
+        network.power_loss(network.stu if name == "STU" else network.sensor(name))
 
     names = ", ".join(f"{sensor.name} ({sensor.mac})" for sensor in network.sensors)
     return Simulation(
@@ -93,6 +95,8 @@ def open_simulation(options: argparse.Namespace) -> Simulation:
         {"silent": switch([network.faults], "silent"),
          "padding": switch([network.faults], "padding"), "silent-on": network.stay_silent,
          "away": away, "back": back, "power-cycle": power_cycle,
+         "unplug": lambda _: server.unplug(), "plug": lambda _: server.plug(),
+         "hang": lambda _: server.hang(),
          **fault_commands(network.faults, FAULTS)}, server.close)
 
 

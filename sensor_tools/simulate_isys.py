@@ -18,7 +18,7 @@ from sensor_tools.simulation import (
     LINE_FAULTS,
     Simulation,
     add_line_arguments,
-    fault_commands,
+    line_commands,
     numbers,
     set_faults,
     switch,
@@ -52,9 +52,13 @@ def open_simulation(options: argparse.Namespace) -> Simulation:
         for radar in radars:
             radar.power_cycle()
 
+    def refuse(codes: str) -> None:
+        for radar in radars:
+            radar.refuse = {int(code, 0) for code in codes.split(",") if code}
+
     names = ", ".join(f"{radar.model.name} at address {radar.address}" for radar in radars)
     return Simulation(
         f"{line.port}: {names}",
         {**{name.replace("_", "-"): switch(radars, name)
             for name in ("silent", "clipping", "strict", "self_starting", "bare", "nonsense")},
-         "power-cycle": power_cycle, **fault_commands(line.faults, LINE_FAULTS)}, line.close)
+         "power-cycle": power_cycle, "refuse": refuse, **line_commands(line)}, line.close)

@@ -19,7 +19,7 @@ from sensor_tools.simulation import (
     Simulation,
     add_faults,
     add_line_arguments,
-    fault_commands,
+    line_commands,
     numbers,
     set_fault,
     set_faults,
@@ -70,7 +70,7 @@ def open_simulation(options: argparse.Namespace) -> Simulation:
     addresses = ", ".join(str(sensor.address) for sensor in sensors)
     return Simulation(
         f"{line.port}: UC4000 at address {addresses}",
-        commands | fault_commands(line.faults, LINE_FAULTS), line.close)
+        commands | line_commands(line), line.close)
 
 
 def _commands(sensors: Sequence[SimulatedSensor]) -> dict[str, Callable[[str], None]]:

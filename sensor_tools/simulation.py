@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from driver_common.errors import DriverError
+from driver_common.simulator.line import SimulatedLine
 
 LINE_FAULTS = {"drop": "probability that a reply is lost",
                "corrupt": "probability that a byte of a reply is damaged",
@@ -23,7 +24,9 @@ LINE_FAULTS = {"drop": "probability that a reply is lost",
                "split": "pause in s in the middle of each reply",
                "delay": "time in s added before each reply",
                "damage": "probability that a byte, in either direction, is lost, flipped, "
-                         "doubled or late"}
+                         "doubled or late",
+               "babble": "share of the time in which something else sends without end",
+               "babble_byte": "value of its bytes, or any at -1"}
 
 
 @dataclass(frozen=True)
@@ -59,13 +62,13 @@ def add_line_arguments(parser: argparse.ArgumentParser) -> None:
 def add_faults(parser: argparse.ArgumentParser, names: Mapping[str, str]) -> None:
     """Add an argument for each fault: name and what it means."""
     for name, text in names.items():
-        parser.add_argument(f"--{name.replace('_', '-')}", type=float, default=0.0, help=text)
+        parser.add_argument(f"--{name.replace('_', '-')}", type=float, help=text)
 
 
 def set_faults(faults: Any, names: Iterable[str], options: argparse.Namespace) -> None:
     """Set the faults that were given as arguments."""
     for name in names:
-        if getattr(options, name):
+        if getattr(options, name) is not None:
             set_fault(faults, name, getattr(options, name))
 
 
@@ -77,9 +80,16 @@ def set_fault(faults: Any, name: str, value: float) -> None:
 def fault_commands(faults: Any, names: Iterable[str]) -> dict[str, Callable[[str], None]]:
     """Return a command per fault, which takes a number."""
     def command(name: str) -> Callable[[str], None]:
-        return lambda argument: set_fault(faults, name, float(argument))
+        return lambda argument: set_fault(faults, name, number(argument))
 
     return {name: command(name) for name in names}
+
+
+def line_commands(line: SimulatedLine) -> dict[str, Callable[[str], None]]:
+    """Return what every serial line can be told, by name."""
+    return {"unplug": lambda _: line.unplug(), "plug": lambda _: line.plug(),
+            "hang": lambda _: line.hang(), "baud": lambda rate: line.set_baud_rate(int(rate)),
+            "echo": switch([line.faults], "echo"), **fault_commands(line.faults, LINE_FAULTS)}
 
 
 def switch(targets: Iterable[Any], attribute: str) -> Callable[[str], None]:
@@ -93,6 +103,11 @@ def switch(targets: Iterable[Any], attribute: str) -> Callable[[str], None]:
             setattr(target, attribute, argument == "on")
 
     return command
+
+
+def number(text: str) -> float:
+    """Return a number such as 0.5 or 0x55; raises ValueError."""
+    return int(text, 16) if text.startswith("0x") else float(text)
 
 
 def numbers(text: str, option: str) -> list[int]:

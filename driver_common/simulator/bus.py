@@ -32,6 +32,7 @@ ATTACH_TIME = 0.2  # s for which frames wait for a new client that says nothing
 MAX_WAITING = 1 << 20  # bytes that wait for a slow client; what comes on top is dropped
 MAX_MESSAGE = 4096  # bytes without an end after which they are no message
 EXTENDED_ID, STANDARD_ID = 0x1FFFFFFF, 0x7FF
+_STOP, _HANG = b"s", b"h"  # what the thread is told
 
 _MESSAGE = re.compile(rb"<\s*([^<>]*?)\s*>")
 
@@ -100,38 +101,54 @@ class SimulatedBus:
         Raises:
             LinkError: The TCP port cannot be made.
         """
-        host, _, port = listen.rpartition(":")
-        try:
-            self._server = socket.create_server((host or "127.0.0.1", int(port)))
-        except (OSError, ValueError, OverflowError) as error:
-            raise LinkError(f"cannot listen on {listen}: {error}") from error
-        self._server.setblocking(False)
+        self._server = _listen(listen)
         self.host, self.port = self._server.getsockname()[:2]
         self.dropped = 0
         self._devices = devices
         self._channel = channel
         self._clients: set[_Client] = set()
+        self._hung: list[_Client] = []
         self._selector = selectors.DefaultSelector()
         self._wake_reader, self._wake_writer = os.pipe()
-        self._selector.register(self._server, selectors.EVENT_READ)
         self._selector.register(self._wake_reader, selectors.EVENT_READ)
         self._wall_offset = time.time() - time.monotonic()
-        self._thread = threading.Thread(target=self._run, name="simulated bus", daemon=True)
+        self._thread: threading.Thread | None = None
 
     def start(self) -> SimulatedBus:
         """Serve the bus in a thread."""
+        self._selector.register(self._server, selectors.EVENT_READ)
+        self._thread = threading.Thread(target=self._run, name="simulated bus", daemon=True)
         self._thread.start()
         return self
 
-    def close(self) -> None:
-        """Take the server away, as if it were unplugged."""
-        if self._thread.is_alive():
-            os.write(self._wake_writer, b".")
+    def unplug(self) -> None:
+        """Take the server away; the devices keep their power."""
+        if self._thread is not None:
+            os.write(self._wake_writer, _STOP)
             self._thread.join()
+            self._thread = None
+            self._selector.unregister(self._server)
         for client in list(self._clients):
             self._part(client)
-        self._selector.close()
+        for client in self._hung:
+            client.socket.close()
+        self._hung.clear()
         self._server.close()
+
+    def plug(self) -> None:
+        """Give the server back, and serve the bus; raises LinkError."""
+        if self._thread is None:
+            self._server = _listen(f"{self.host}:{self.port}")
+            self.start()
+
+    def hang(self) -> None:
+        """Forget the clients without a word, as a server that lost its power."""
+        os.write(self._wake_writer, _HANG)
+
+    def close(self) -> None:
+        """Take the server away for good."""
+        self.unplug()
+        self._selector.close()
         with contextlib.suppress(OSError):
             os.close(self._wake_reader)
             os.close(self._wake_writer)
@@ -145,7 +162,10 @@ class SimulatedBus:
             ready = self._selector.select(min(pause, IDLE_TIME))
             for key, events in ready:
                 if key.fd == self._wake_reader:
-                    return
+                    if os.read(self._wake_reader, 1) == _STOP:
+                        return
+                    self._forget_clients()
+                    break  # the others of this round may be forgotten
                 if key.fileobj is self._server:
                     self._accept()
                 else:
@@ -154,6 +174,12 @@ class SimulatedBus:
             for client in list(self._clients):
                 if client.waiting and client.events == selectors.EVENT_READ:
                     self._send(client, b"")  # it may be attached by now
+
+    def _forget_clients(self) -> None:
+        for client in self._clients:
+            self._selector.unregister(client.socket)
+            self._hung.append(client)
+        self._clients.clear()
 
     def _accept(self) -> None:
         with contextlib.suppress(OSError):
@@ -235,6 +261,16 @@ class SimulatedBus:
             self._clients.remove(client)
             self._selector.unregister(client.socket)
             client.socket.close()
+
+
+def _listen(address: str) -> socket.socket:
+    host, _, port = address.rpartition(":")
+    try:
+        server = socket.create_server((host or "127.0.0.1", int(port)))
+    except (OSError, ValueError, OverflowError) as error:
+        raise LinkError(f"cannot listen on {address}: {error}") from error
+    server.setblocking(False)
+    return server
 
 
 class _Client:

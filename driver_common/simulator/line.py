@@ -36,6 +36,8 @@ from driver_common.errors import LinkError
 from driver_common.serial_link import BITS_PER_BYTE
 
 CHUNK_TIME = 0.002  # s of line time that is written at once
+IDLE_TIME = 0.05  # s after which a silent line looks whether it misbehaves otherwise now
+_STOP, _HANG = b"s", b"h"  # what the thread is told
 DAMAGES = ("drop", "flip", "double", "delay", "split")
 PAUSES = {"split": (0.002, 0.010), "delay": (0.02, 0.3)}  # s in front of a byte
 SPEEDS = {getattr(termios, name): int(name[1:]) for name in dir(termios) if name[1:].isdigit()}
@@ -65,6 +67,8 @@ class Faults:
         delay: Additional time in s before each reply.
         damage: Probability that a byte, in either direction, is hurt: lost, one of its bits
             flipped, doubled, or late, by much or by little.
+        babble: Share of the time in which something else sends, without end …
+        babble_byte: … this byte value, or any at -1.
         echo: Whether the master hears its own bytes.
         silent: Whether nothing gets through.
     """
@@ -75,6 +79,8 @@ class Faults:
     split: float = 0.0
     delay: float = 0.0
     damage: float = 0.0
+    babble: float = 0.0
+    babble_byte: int = -1
     echo: bool = False
     silent: bool = False
     random: random.Random = field(default_factory=lambda: random.Random(1))
@@ -94,6 +100,13 @@ class Faults:
             middle = len(reply) // 2
             return [(due, reply[:middle]), (due + self.split, reply[middle:])]
         return [(due + delay, piece) for delay, piece in self.hurt(reply)]
+
+    def babbled(self, count: int) -> bytes:
+        """Return what something else sends in the time of so many bytes."""
+        count = round(count * self.babble)
+        if self.babble_byte < 0:
+            return self.random.randbytes(count)
+        return bytes((self.babble_byte,)) * count
 
     def hurt(self, data: bytes) -> list[tuple[float, bytes]]:
         """Return the pieces that arrive in place of `data`, each with its delay in s."""
@@ -133,8 +146,7 @@ class SimulatedLine:
         """
         self.faults = Faults()
         self._device = device
-        self._transport = _Tcp(listen) if listen else _Pty(link)
-        self.port = self._transport.port
+        self._listen, self._link = listen, link
         self._gap = gap
         self._due: list[tuple[float, int, Callable[[float], None]]] = []  # what to do, and when
         self._order = itertools.count()
@@ -142,47 +154,92 @@ class SimulatedLine:
         self._arrived_until = self._last_arrival = 0.0
         self._busy: list[tuple[float, float]] = []  # when the line is taken, from … until
         self._wake_reader, self._wake_writer = os.pipe()
-        self._closed = False
-        self._thread = threading.Thread(target=self._run, name="simulated line", daemon=True)
+        self._babbled_until = time.monotonic()
+        self._transport: _Tcp | _Pty | None = None
+        self._thread: threading.Thread | None = None
+        self._open()
+
+    def _open(self) -> None:
+        self._transport = _Tcp(self._listen) if self._listen else _Pty(self._link)
+        self.port = self._transport.port
+        if isinstance(self._transport, _Tcp):
+            self._listen = self.port.partition("//")[2]  # also the next time, if any port was taken
 
     def start(self) -> SimulatedLine:
         """Serve the line in a thread."""
+        assert self._transport is not None
+        self._thread = threading.Thread(target=self._run, args=(self._transport,),
+                                        name="simulated line", daemon=True)
         self._thread.start()
         return self
 
-    def close(self) -> None:
-        """Take the line away, as if it were unplugged."""
-        if self._closed:  # its descriptors may belong to others by now
+    def unplug(self) -> None:
+        """Take the port away; the devices keep their power."""
+        if self._transport is None:  # its descriptors may belong to others by now
             return
-        self._closed = True
-        if self._thread.is_alive():
-            os.write(self._wake_writer, b".")
+        if self._thread is not None:
+            os.write(self._wake_writer, _STOP)
             self._thread.join()
         self._transport.close()
+        self._transport = self._thread = None
+        self._due.clear()
+
+    def plug(self) -> None:
+        """Give the port back, and serve it; raises LinkError."""
+        if self._transport is None:
+            self._open()
+            self.start()
+
+    def hang(self) -> None:
+        """Forget the client without a word, as a server that lost its power; TCP only."""
+        os.write(self._wake_writer, _HANG)
+
+    def set_baud_rate(self, baud_rate: int) -> None:
+        """Have the devices talk at a rate in Bd."""
+        self._device.baud_rate = baud_rate
+
+    def close(self) -> None:
+        """Take the line away for good."""
+        if self._wake_reader < 0:
+            return
+        self.unplug()
         os.close(self._wake_reader)
         os.close(self._wake_writer)
+        self._wake_reader = -1
 
-    def _run(self) -> None:
+    def _run(self, transport: _Tcp | _Pty) -> None:
         while True:
-            timeout = max(0.0, self._due[0][0] - time.monotonic()) if self._due else None
-            ready, _, _ = select.select(
-                [self._wake_reader, *self._transport.readers()], [], [], timeout)
+            due = self._due[0][0] - time.monotonic() if self._due else IDLE_TIME
+            pause = CHUNK_TIME if self.faults.babble else IDLE_TIME
+            ready, _, _ = select.select([self._wake_reader, *transport.readers()], [], [],
+                                        min(max(due, 0.0), pause))
             if self._wake_reader in ready:
-                return
-            data = self._transport.read(ready)
+                if os.read(self._wake_reader, 1) == _STOP:
+                    return
+                transport.hang()
+            data = transport.read(ready)
             if data:
-                self._receive(data, time.monotonic())
+                self._receive(data, transport.speed(), time.monotonic())
             while self._due and self._due[0][0] <= time.monotonic():
                 due, _, action = heapq.heappop(self._due)
                 action(due)
+            self._babble(transport)
+
+    def _babble(self, transport: _Tcp | _Pty) -> None:
+        now = time.monotonic()
+        count = round(min(now - self._babbled_until, IDLE_TIME) / self._byte_time)
+        if not self.faults.babble:
+            self._babbled_until = now
+        elif count:
+            self._babbled_until = now
+            transport.write(self.faults.babbled(count))
 
     def _plan(self, due: float, action: Callable[[float], None]) -> None:
         heapq.heappush(self._due, (due, next(self._order), action))
 
-    def _receive(self, data: bytes, now: float) -> None:
+    def _receive(self, data: bytes, speed: int, now: float) -> None:
         if self.faults.echo:  # made by the adapter, so at its own rate
             self._schedule(now, data)
-        speed = self._transport.speed()
         if speed and speed != self._device.baud_rate:
             data = bytes(byte ^ 0x5A for byte in data)  # what a wrong baud rate makes of them
         for delay, piece in self.faults.hurt(data):
@@ -223,6 +280,7 @@ class SimulatedLine:
             self._plan(due, partial(self._write, chunk))
 
     def _write(self, chunk: bytes, due: float) -> None:
+        assert self._transport is not None
         self._transport.write(chunk)
 
     def _first_free(self, due: float, duration: float) -> float:
@@ -273,6 +331,9 @@ class _Pty:
         with contextlib.suppress(BlockingIOError):  # nobody reads: a real line forgets as well
             os.write(self._master, data)
 
+    def hang(self) -> None:
+        """Do nothing: who unplugs a serial port is noticed."""
+
     def close(self) -> None:
         if self._link is not None and self._link.is_symlink():
             with contextlib.suppress(OSError):
@@ -292,6 +353,7 @@ class _Tcp:
         except (OSError, ValueError) as error:
             raise LinkError(f"cannot listen on {listen}: {error}") from error
         self._client: socket.socket | None = None
+        self._hung: list[socket.socket] = []
         address = self._server.getsockname()
         self.port = f"socket://{address[0]}:{address[1]}"
 
@@ -323,7 +385,13 @@ class _Tcp:
             with contextlib.suppress(OSError):
                 self._client.sendall(data)
 
-    def close(self) -> None:
+    def hang(self) -> None:
+        """Leave the client alone, with a connection that looks well."""
         if self._client is not None:
-            self._client.close()
+            self._hung.append(self._client)
+            self._client = None
+
+    def close(self) -> None:
+        for client in filter(None, (self._client, *self._hung)):
+            client.close()
         self._server.close()

@@ -48,6 +48,7 @@ _FOREIGN = (  # what else can be on a bus: standard frames, other versions, host
     CanFrame(0x18FEF100, bytes.fromhex("FF FF FF")),
     CanFrame(0x123, b"", extended=False),
 )
+_ERROR = CanFrame(0x004, bytes(8), error=True)  # the controller complains
 
 
 class SimulatedNetwork:
@@ -78,8 +79,8 @@ class SimulatedNetwork:
         self._last_arrival = 0.0
         self._losing = 0
         self._overtaken: CanFrame | None = None
-        self._foreign = itertools.cycle(_FOREIGN)
-        self._next_foreign = 0.0
+        self._foreign, self._errors = itertools.cycle(_FOREIGN), itertools.cycle((_ERROR,))
+        self._next_of_others = {self._foreign: 0.0, self._errors: 0.0}
 
     # --- for tests and people ---
 
@@ -151,6 +152,7 @@ class SimulatedNetwork:
             self.stu.radio_received += 1
             if self.faults.random.random() < self.faults.answer_loss:
                 return
+            delay += self.faults.answer_delay
         error, data = answer
         if self.faults.padding and request.block == STREAMING:
             data = data.ljust(MAX_PAYLOAD, b"\0")
@@ -169,9 +171,10 @@ class SimulatedNetwork:
             while self._answers and self._answers[0][0] <= now:
                 when, _, frame = heapq.heappop(self._answers)
                 due.append((when, frame))
-            if self.faults.foreign and now >= self._next_foreign:
-                due.append((now, next(self._foreign)))
-                self._next_foreign = now + 1 / self.faults.foreign
+            for rate, frames in self._others():
+                if now >= self._next_of_others[frames]:
+                    due.append((now, next(frames)))
+                    self._next_of_others[frames] = now + 1 / rate
             if self.faults.silent:
                 return []
             self.streamed += streamed
@@ -185,12 +188,16 @@ class SimulatedNetwork:
             times = [self._answers[0][0]] if self._answers else []
             if self._on_air:
                 times.append(self._on_air[0][0])
-            if self.faults.foreign:
-                times.append(self._next_foreign)
+            times += [self._next_of_others[frames] for _, frames in self._others()]
             if self.stu.connected is not None:
                 times.append(self.stu.connected.next_frame())
             first = min(times, default=math.inf)
             return None if first == math.inf else first
+
+    def _others(self) -> list[tuple[float, itertools.cycle[CanFrame]]]:
+        """Return what comes on the bus beside the network's frames, with how many per s."""
+        every = (self.faults.foreign, self._foreign), (self.faults.errors, self._errors)
+        return [(rate, frames) for rate, frames in every if rate]
 
     def _advance(self, now: float) -> None:
         """Bring everything to the present: frames that were measured, and connections."""

@@ -40,11 +40,13 @@ class Faults:
         jitter: Time in s by which such a frame comes late, at most.
         burst: Time in s for which such frames are held back, to come all at once.
         answer_loss: Probability that an answer of a sensor is lost.
+        answer_delay: Time in s that an answer of a sensor takes beyond the usual.
         refused_connects: How many of the next attempts to connect fail.
         connect_time: Time in s that a connection takes beyond the shortest.
         newness: Time in s in which a sensor that was just found tells neither its MAC address nor
             its RSSI nor all of its name (field note N3).
         foreign: Frames per s on the bus that belong to something else.
+        errors: Error frames per s on the bus.
         padding: Whether answers to requests for single values have 8 bytes (field note N9).
         silent: Whether nothing gets through.
     """
@@ -57,10 +59,12 @@ class Faults:
     jitter: float = 0.0
     burst: float = 0.0
     answer_loss: float = 0.0
+    answer_delay: float = 0.0
     refused_connects: int = 0
     connect_time: float = 0.0
     newness: float = 0.0
     foreign: float = 0.0
+    errors: float = 0.0
     padding: bool = False
     silent: bool = False
     random: random.Random = field(default_factory=lambda: random.Random(1))

@@ -277,6 +277,54 @@ def test_a_simulated_line_that_was_closed_leaves_later_ones_alone(tmp_path):
     second.close()
 
 
+@pytest.mark.parametrize("where", ["link", "listen"])
+def test_a_simulated_line_can_be_unplugged(where, tmp_path):
+    line = SimulatedLine(Device(), **{
+        where: {"link": str(tmp_path / "port"), "listen": "127.0.0.1:0"}[where]}).start()
+    port = line.port
+    link = SerialLink(port, 115200)
+    line.unplug()
+    with pytest.raises(LinkError, match="lost"):
+        link.read(DEADLINE)
+    link.close()
+    with pytest.raises(LinkError, match=r"no such port|nothing listens"):
+        SerialLink(port, 115200)
+    line.plug()
+    assert line.port == port
+    link = SerialLink(port, 115200)
+    link.write(b"ab")
+    assert read_all(link, 2) == b"ba"
+    link.close()
+    line.close()
+
+
+def test_a_simulated_server_can_forget_its_client():
+    line = SimulatedLine(Device(), listen="127.0.0.1:0").start()
+    link = SerialLink(line.port, 115200)
+    link.write(b"ab")
+    assert read_all(link, 2) == b"ba"
+    line.hang()
+    second = SerialLink(line.port, 115200)
+    second.write(b"cd")
+    assert read_all(second, 2) == b"dc"
+    link.write(b"ab")
+    assert link.read(0.05) == b""  # and no error
+    link.close()
+    second.close()
+    line.close()
+
+
+def test_a_simulated_line_can_babble():
+    line = SimulatedLine(Device()).start()
+    link = SerialLink(line.port, 115200)
+    line.faults.babble_byte, line.faults.babble = 0x55, 0.5
+    assert set(read_all(link, 2000)) == {0x55}
+    line.faults.babble_byte = -1
+    assert len(set(read_all(link, 4000))) > 2
+    link.close()
+    line.close()
+
+
 # --- ports elsewhere -----------------------------------------------------------------------------
 
 def test_a_port_over_rfc_2217(terminal):

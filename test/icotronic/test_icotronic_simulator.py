@@ -774,6 +774,40 @@ def test_a_closed_server_is_gone(server: SimulatedIcotronic) -> None:
     server.close()  # a second time does no harm
 
 
+def test_a_server_can_be_unplugged(server: SimulatedIcotronic) -> None:
+    with _open(server) as bus:
+        _ask(bus, commands.READ_STATE.request(STU))
+    server.unplug()
+    with pytest.raises(OSError, match=r"refused|reset"):
+        socket.create_connection((server.host, server.port), 1.0)
+    server.plug()
+    with _open(server) as bus:
+        _ask(bus, commands.READ_STATE.request(STU))
+
+
+def test_a_server_can_forget_its_clients(server: SimulatedIcotronic) -> None:
+    with _open(server) as bus:
+        _ask(bus, commands.READ_STATE.request(STU))
+        server.hang()
+        with _open(server) as second:
+            _ask(second, commands.READ_STATE.request(STU))
+        request = commands.READ_STATE.request(STU).frame
+        bus.send(can.Message(arbitration_id=request.identifier.encode(), data=request.data))
+        assert bus.recv(0.05) is None
+
+
+def test_error_frames_and_late_answers() -> None:
+    host = Host().connect()
+    host.network.faults.errors = 100.0
+    host.wait(0.5)
+    assert sum(frame.error for _, frame in host.heard) == pytest.approx(50, abs=5)
+    host.network.faults.errors = 0.0
+    host.network.faults.answer_delay = 0.25
+    with pytest.raises(TimeoutError):
+        host.ask(commands.READ_STATE.request(STH), 0.2)
+    host.ask(commands.READ_STATE.request(STH), 0.5)
+
+
 def test_it_needs_little_of_the_processor(bus: can.BusABC, server: SimulatedIcotronic) -> None:
     _connect(bus)
     _ask(bus, commands.START_ACCELERATION.request(STH, StreamFormat(X, 1)))

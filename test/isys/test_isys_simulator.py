@@ -571,8 +571,9 @@ def test_a_simulator_obeys(simulate, tmp_path):
     process = simulate("--link", path)
     process.wait_for_line("commands: ")
     for command in ("silent on", "silent off", "clipping on", "strict on", "self-starting on",
-                    "drop 0.5", "drop 0",
-                    "delay 0.001", "power-cycle"):
+                    "drop 0.5", "drop 0", "delay 0.001", "power-cycle", "refuse 0xDA,0xD1",
+                    "refuse", "baud 57600", "baud 115200", "babble 0.5", "babble_byte 0x55",
+                    "babble 0", "echo on", "echo off", "unplug", "plug", "hang"):
         process.tell(command)
         process.wait_for_line(f"done: {command}")
     for command in ("dance", "silent", "silent maybe", "drop much"):
