@@ -123,7 +123,8 @@ class Field:
             if self.form is Form.FLOAT:
                 return struct.pack("<f", value)
             if math.isfinite(value):
-                return round(value / self.factor).to_bytes(self.length, "little")
+                raw = value if self.factor == 1 else value / self.factor  # a float has 53 bits
+                return round(raw).to_bytes(self.length, "little")
         except OverflowError:
             pass
         largest = ((1 << 8 * self.length) - 1) * self.factor

@@ -88,6 +88,11 @@ def test_an_empty_eeprom_holds_nothing_that_looks_real() -> None:
     assert STH_EEPROM["STH Name"].decode(b"\xff" * 8) == "\ufffd" * 8
 
 
+def test_a_number_with_more_digits_than_a_float_has() -> None:
+    data = bytes.fromhex("36 42 FF FF FF FF FF FF")
+    assert STH_EEPROM["GTIN"].encode(STH_EEPROM["GTIN"].decode(data)) == data
+
+
 def test_text_for_people() -> None:
     assert STH_EEPROM["Sleep Time 1"].text(300.0) == "300 s"
     assert STH_EEPROM["STH Name"].text("Tanja") == "Tanja"
