@@ -6,11 +6,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The lifecycle node that all drivers share: parameters, the bus thread, diagnostics, shut-down."""
+"""The lifecycle node that all drivers share: the bus thread, topics, diagnostics, shut-down."""
 
 from __future__ import annotations
 
-import re
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -20,11 +19,9 @@ from typing import Any, NamedTuple, Protocol
 import rclpy
 from diagnostic_msgs.msg import DiagnosticStatus
 from lifecycle_msgs.srv import ChangeState
-from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
-from rclpy.parameter import Parameter as RosParameter
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
@@ -33,25 +30,19 @@ from driver_common import diagnostics, node_recorder, program
 from driver_common.device_thread import Bus, DeviceThread
 from driver_common.errors import DriverError, SettingError
 from driver_common.node_recorder import NodeRecorder
-from driver_common.parameters import ParameterStore, refusal
-from driver_common.recording import SERIAL, read_recording
-from driver_common.replay import recording_path
-from driver_common.settings import Option, Setting, Value
+from driver_common.parameter_node import ParameterNode
+from driver_common.recording import SERIAL
+from driver_common.settings import Option
 
-SENSOR_NAME = re.compile("[a-z][a-z0-9_]*")
 CONFIG_MODES = {"push": 0, "check": 1, "leave": 2}
 
-SENSORS = Option(
-    "sensors", kind=list, default=[], read_only=True,
-    description="Names of the sensors on the bus, given at the start; empty = a single one "
-                "without a name")
 FRAME_ID = Option(
     "frame_id", kind=str, default="{sensor}_link", pattern=r"[^/\s]\S*", live=True,
     description="Frame of the measurements, a name without spaces and without a slash in front")
 TIME_OFFSET = Option(
     "time_offset", kind=float, default=0.0, minimum=-10.0, maximum=10.0, unit="s", live=True,
     description="Added to every stamp; negative where the measurement was earlier")
-COMMON_OPTIONS = (
+_COMMON_OPTIONS = (
     Option("autostart", kind=bool, default=True,
            description="Configure and activate without being asked"),
     Option("config_mode", kind=str, choices=CONFIG_MODES, default="push",
@@ -75,35 +66,24 @@ class Topic(NamedTuple):
     depth: int = 10
 
 
-class DeviceNode(LifecycleNode):
+class DeviceNode(ParameterNode):
     """A driver: a bus with one or more devices.
 
     Subclasses give the options and the bus, and publish what the bus reports.
 
     Attributes:
-        bus: The session; None while the node is not configured.
         thread: The thread that serves it.
         simulator: What `make_bus` started to have something to talk to.
     """
 
     KIND = "sensor"  # what a device without a name is called
     LINK = SERIAL  # what its recordings are of
-    SEVERAL_SENSORS = True  # whether the bus can have more than one
-    BUS_OPTIONS: Sequence[Option] = ()
-    SENSOR_OPTIONS: Sequence[Option] = ()
-    ALL_SETTINGS: Mapping[str, Setting] = {}
+    COMMON_OPTIONS = _COMMON_OPTIONS
     TOPICS: Mapping[str, Topic] = {}
 
     def __init__(self, name: str) -> None:
-        """Declare the driver's own parameters.
-
-        Raises:
-            SettingError: One of them has an unacceptable value.
-        """
+        """Declare the options; raises SettingError where one has an unacceptable value."""
         super().__init__(name)
-        self.store = ParameterStore(self)
-        self._take_recorded_parameters()
-        self.bus: Any = None
         self.thread: DeviceThread | None = None
         self.simulator: Simulator | None = None
         self._stopping = False
@@ -112,10 +92,8 @@ class DeviceNode(LifecycleNode):
         self._statuses_due = 0.0
         self._statuses_made = 0.0
         self._diagnostics = diagnostics.Diagnostics(self)
-        self._recorder = NodeRecorder(self)
-        self._devices: dict[str, Any] = {}
+        self._recorder = NodeRecorder(self, self.LINK, self.channel, self.link_facts)
         self._entities: list[Callable[[], object]] = []
-        self._declare_options()
         self.create_timer(diagnostics.PERIOD, self._publish_diagnostics,
                           clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.create_timer(node_recorder.PERIOD, self._recorder.write_raw,
@@ -133,9 +111,6 @@ class DeviceNode(LifecycleNode):
         for name, enabled in (("start_acquisition", True), ("stop_acquisition", False)):
             self.add_trigger(sensor, name, partial(self._enable, sensor, enabled))
 
-    def add_device_interfaces(self, device: Any) -> None:
-        """Create the publishers that depend on what the device is."""
-
     def channel(self) -> str:
         """Return the name of the bus in a recording, "" where it has none."""
         return ""
@@ -152,195 +127,6 @@ class DeviceNode(LifecycleNode):
         """Return the diagnostics of a device."""
         raise NotImplementedError
 
-    def check_option(self, name: str, value: Value) -> None:
-        """Refuse a live option that the devices cannot carry out; raises SettingError."""
-
-    def apply_options(self) -> None:
-        """Hand live options to the bus after a change."""
-
-    # --- parameters ---
-
-    def _declare_options(self) -> None:
-        for option in self.bus_options():
-            self._declare_option("", option)
-        self._check_sensor_names()
-        for sensor in self.sensors:
-            for option in self.SENSOR_OPTIONS:
-                self._declare_option(self.prefix(sensor), option)
-        self._warn_of_unknown_overrides()
-        if self.get_parameter("use_sim_time").value:
-            self.get_logger().warning("use_sim_time has no effect: stamps are this host's time of "
-                                      "the measurement")
-
-    @classmethod
-    def bus_options(cls) -> list[Option]:
-        """Return the options that do not belong to one sensor."""
-        return [*([SENSORS] if cls.SEVERAL_SENSORS else []), *COMMON_OPTIONS, *cls.BUS_OPTIONS]
-
-    def _take_recorded_parameters(self) -> None:
-        """Where a recording is to be played: use its parameters, if the user gave no others."""
-        path = recording_path(self.store.overrides)
-        if path is not None:
-            recorded = read_recording(path, head=True).parameters
-            self.store.overrides = {**recorded, **self.store.overrides}
-
-    def _check_sensor_names(self) -> None:
-        reserved = {option.name for option in self.bus_options()}
-        for sensor in self.sensors:
-            if sensor and (not SENSOR_NAME.fullmatch(sensor) or sensor in reserved):
-                raise SettingError(f'sensors: "{sensor}" cannot be a name, it must be a lower-case '
-                                   "word such as front, and no parameter of the node")
-        if len(set(self.sensors)) < len(self.sensors):
-            raise SettingError("sensors: each name must be there once")
-
-    def _declare_option(self, prefix: str, option: Option) -> None:
-        name = prefix + option.name
-        default = option.default
-        if isinstance(default, str) and "{sensor}" in default:
-            default = default.format(sensor=prefix.rstrip(".") or self.get_name())
-        try:
-            value = option.check(self.store.overrides.get(name, default))
-        except SettingError as error:
-            raise SettingError(f"{prefix}{error}") from None
-        self.store.declare(name, option, value)
-
-    def _warn_of_unknown_overrides(self) -> None:
-        """Name overrides that no model of this driver could have."""
-        known = [option.name for option in self.bus_options()]
-        for sensor in self.sensors:
-            known += [self.prefix(sensor) + name for name in (
-                *(option.name for option in self.SENSOR_OPTIONS), *self.ALL_SETTINGS)]
-        for line in self.store.unknown_overrides("", known, "this driver"):
-            self.get_logger().warning(line)
-
-    @property
-    def sensors(self) -> list[str]:
-        """Names of the sensors, [""] for a single one without a name."""
-        names = self.option("sensors") if self.SEVERAL_SENSORS else []
-        return list(names) or [""]
-
-    @staticmethod
-    def prefix(sensor: str) -> str:
-        """Return the prefix of a sensor's parameters."""
-        return f"{sensor}." if sensor else ""
-
-    @staticmethod
-    def topic(sensor: str, name: str) -> str:
-        """Return the name of a sensor's topic or service."""
-        return f"~/{sensor}/{name}" if sensor else f"~/{name}"
-
-    def option(self, name: str, sensor: str = "") -> Any:
-        """Return the value of an option."""
-        return self.get_parameter(self.prefix(sensor) + name).value
-
-    def wanted_settings(self, sensor: str) -> dict[str, Value]:
-        """Return the device settings that the user gave for a sensor."""
-        prefix = self.prefix(sensor)
-        return {name: self.store.overrides[prefix + name] for name in self.ALL_SETTINGS
-                if prefix + name in self.store.overrides}
-
-    def show_settings(self, sensor: str, device: Any) -> None:
-        """Declare a device's settings with the values that it reported; from any thread."""
-        self.later(lambda: self._show_settings(sensor, device))
-
-    def _show_settings(self, sensor: str, device: Any) -> None:
-        if self.bus is None or device not in self.bus.devices:
-            return
-        # As they are now, because a set may have come since; between two steps of the bus.
-        settings, values = self.call(lambda: (dict(device.settings), dict(device.values)))
-        if settings.keys() != values.keys():  # the device was lost while it was read
-            return
-        prefix = self.prefix(sensor)
-        gone = [name for name, owner in self._devices.items()
-                if owner is device and name.removeprefix(prefix) not in settings]
-        self.store.undeclare(gone)
-        for name in gone:
-            del self._devices[name]
-        for name, setting in settings.items():
-            self.store.declare(prefix + name, setting, values[name])
-            self._devices[prefix + name] = device
-        self.add_device_interfaces(device)
-        lacking = [name for name in self.wanted_settings(sensor) if name not in settings]
-        for name in lacking:
-            self.get_logger().warning(f"parameter {prefix}{name}: the {device.product} has no such "
-                                      "setting; it is ignored")
-
-    def set_parameters_atomically(
-            self, parameter_list: list[RosParameter]) -> SetParametersResult:
-        """Set parameters, all or none; those of a device are written to it and read back."""
-        own = [parameter for parameter in parameter_list
-               if parameter.name in self.store.rows or not self.has_parameter(parameter.name)]
-        if not own:
-            return super().set_parameters_atomically([
-                parameter for parameter in parameter_list
-                if not self.store.is_so_already(parameter)])
-        try:
-            if len(own) < len(parameter_list):
-                raise SettingError("set the parameters of ROS, such as use_sim_time, separately")
-            for parameter in own:
-                self._check_is_there(parameter.name)
-            return self.store.store(self._apply(self.store.check(own)))
-        except DriverError as error:
-            return refusal(error)
-        except Exception as error:  # an exception here would end the node
-            return refusal(DriverError(f"internal error, please report it: {error!r}"))
-
-    def set_parameters(self, parameter_list: list[RosParameter]) -> list[SetParametersResult]:
-        """Set parameters one by one."""
-        return [self.set_parameters_atomically([parameter]) for parameter in parameter_list]
-
-    def _apply(self, values: Mapping[str, Value]) -> dict[str, Value]:
-        """Write device settings among `values`; return all values as they are then."""
-        by_device: dict[Any, dict[str, Value]] = {}
-        for name, value in values.items():
-            if name in self._devices:
-                by_device.setdefault(self._devices[name], {})[name] = value
-            else:
-                self._check_may_change(name, value)
-                self.check_option(name, value)
-        result = dict(values)
-        done: list[tuple[Any, dict[str, Value]]] = []
-        try:
-            for device, changes in by_device.items():
-                before = {name: self.get_parameter(name).value for name in changes}
-                result |= self._write(device, changes)
-                done.append((device, before))
-        except DriverError:
-            for device, before in reversed(done):
-                self._write(device, before)
-            raise
-        if len(result) > sum(map(len, by_device.values())):
-            self.later(self.apply_options)
-        return result
-
-    def _write(self, device: Any, changes: Mapping[str, Value]) -> dict[str, Value]:
-        prefix = self.prefix(device.options.name)
-        reported = self.call(lambda: self.bus.write(
-            device, {name.removeprefix(prefix): value for name, value in changes.items()}))
-        return {prefix + name: value for name, value in reported.items()}
-
-    def _check_is_there(self, name: str) -> None:
-        """Say why a device's setting is no parameter now; raises SettingError."""
-        for sensor in self.sensors:
-            known = [self.prefix(sensor) + setting for setting in self.ALL_SETTINGS]
-            if name in self.store.rows or name not in known:
-                continue
-            reason = self._bus_error or (self._unconfigured() if self.bus is None else None)
-            for device in self.bus.devices if self.bus is not None else ():
-                if device.options.name == sensor and reason is None:
-                    reason = (f"the {device.product} has no such setting" if device.settings
-                              else device.error or "still searching the device")
-            raise SettingError(f"{name} cannot be set: {reason}")
-
-    def _check_may_change(self, name: str, value: Value) -> None:
-        option = self.store.rows[name]
-        if (isinstance(option, Option) and not option.live and self.bus is not None
-                and value != self.get_parameter(name).value):
-            node = self.get_fully_qualified_name()
-            raise SettingError(
-                f"{name} cannot change while the node is configured; first run 'ros2 lifecycle "
-                f"set {node} deactivate' and 'ros2 lifecycle set {node} cleanup'")
-
     # --- the bus ---
 
     def call(self, job: Callable[[], Any]) -> Any:
@@ -349,24 +135,15 @@ class DeviceNode(LifecycleNode):
             raise DriverError(self._unconfigured())
         return self.thread.call(job)
 
+    def unreachable(self) -> str:
+        """Return why no device can be reached, "" where one may be."""
+        if self._bus_error is not None:
+            return str(self._bus_error)
+        return self._unconfigured() if self.bus is None else ""
+
     def _unconfigured(self) -> str:
         return ("the node is not configured; run 'ros2 lifecycle set "
                 f"{self.get_fully_qualified_name()} configure'")
-
-    def later(self, job: Callable[[], object]) -> None:
-        """Run a job in the executor, where parameters may be touched."""
-        def guarded() -> None:
-            try:
-                job()
-            except DriverError as error:
-                if self.bus is not None:
-                    self.get_logger().error(str(error))
-            except Exception as error:  # an exception here would end the node
-                if self.context.ok():  # else it was shut down meanwhile
-                    self.get_logger().error(f"internal error, please report it: {error!r}")
-
-        if self.executor is not None:
-            self.executor.create_task(guarded)
 
     def device(self, sensor: str) -> Any:
         """Return the device of a sensor; the node is configured."""
@@ -393,8 +170,9 @@ class DeviceNode(LifecycleNode):
     def on_found(self, device: Any) -> None:
         """Show the device's settings as parameters."""
         self._note_news()
-        self._recorder.note_found(device)
-        self.get_logger().info(f"{device.title}: connected to {self.describe(device)}")
+        description = self.describe(device)
+        self._recorder.note_found(device, description)
+        self.get_logger().info(f"{device.title}: connected to {description}")
         self.show_settings(device.options.name, device)
 
     def on_values(self, device: Any) -> None:
@@ -443,6 +221,11 @@ class DeviceNode(LifecycleNode):
         self._bus_error = None
 
     # --- interfaces ---
+
+    @staticmethod
+    def topic(sensor: str, name: str) -> str:
+        """Return the name of a sensor's topic or service."""
+        return f"~/{sensor}/{name}" if sensor else f"~/{name}"
 
     def add_publisher(self, sensor: str, name: str) -> Any:
         """Create the reliable publisher of a topic, whose QoS can be overridden; gone at clean-up.
@@ -617,8 +400,7 @@ class DeviceNode(LifecycleNode):
         self.bus = None
         self._bus_error = None
         self._statuses_due = 0.0
-        self.store.undeclare(self._devices)
-        self._devices.clear()
+        self.undeclare_settings()
         for destroy in self._entities:
             destroy()
         self._entities.clear()

@@ -15,21 +15,19 @@ import os
 import platform
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from driver_common import recording_files
 from driver_common.errors import DriverError
 from driver_common.flight_recorder import DURATION, FlightRecorder, unpack
+from driver_common.parameter_node import ParameterNode
 from driver_common.recording import RecordingText
 from driver_common.recording_files import RecordingFile, RecordingFiles
 from driver_common.replay import Replay
 from driver_common.settings import Option, Value
-
-if TYPE_CHECKING:
-    from driver_common.device_node import DeviceNode
 
 PACKAGE = "industrial_sensor_drivers"
 LIBRARIES = ("pyserial", "python-can", "numpy")
@@ -60,9 +58,20 @@ class NodeRecorder:
         last: Where the newest recording is; None where there is none.
     """
 
-    def __init__(self, node: DeviceNode) -> None:
-        """Prepare; nothing is written."""
+    def __init__(self, node: ParameterNode, link: str, channel: Callable[[], str],
+                 link_facts: Callable[[], Mapping[str, str]]) -> None:
+        """Prepare; nothing is written.
+
+        Args:
+            node: Whose traffic it is.
+            link: What the recordings are of, SERIAL or CAN.
+            channel: Returns the name of the bus, "" where it has none.
+            link_facts: Returns what a recording says of the link.
+        """
         self._node = node
+        self._link = link
+        self._channel = channel
+        self._link_facts = link_facts
         self.last: Path | None = None
         self._found: dict[str, str] = {}  # what was found, by sensor
         self._in_outage = False
@@ -102,11 +111,11 @@ class NodeRecorder:
 
     # --- in the thread of the bus ---
 
-    def note_found(self, device: Any) -> None:
+    def note_found(self, device: Any, description: str) -> None:
         """Take note that a device was found: a replay needs how."""
         self._in_outage = False
-        self._found[device.options.name] = self._node.describe(device)
-        self._recorder.note(f"found {device.title}: {self._node.describe(device)}")
+        self._found[device.options.name] = description
+        self._recorder.note(f"found {device.title}: {description}")
         self._recorder.keep_search()
 
     def note_link_works(self) -> None:
@@ -205,7 +214,7 @@ class NodeRecorder:
                               self._node.option("recording_limit") * MIB)
 
     def _text(self) -> RecordingText:
-        return RecordingText(self._node.LINK, self._node.channel(), self._recorder.offset)
+        return RecordingText(self._link, self._channel(), self._recorder.offset)
 
     def _facts(self, reason: str) -> dict[str, str]:
         """Return who recorded what and why."""
@@ -215,7 +224,7 @@ class NodeRecorder:
             "versions": f"{PACKAGE} {_version(PACKAGE)}, Python {platform.python_version()}, "
                         + ", ".join(f"{name} {_version(name)}" for name in LIBRARIES)
                         + f", {platform.system()} {platform.release()}",
-            **self._node.link_facts(),
+            **self._link_facts(),
             **{f"device {sensor}".rstrip(): text for sensor, text in self._found.items()},
             **self._settings()}
 

@@ -19,7 +19,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 DRIVERS = sorted(path.name for path in ROOT.glob("*_driver") if (path / "__init__.py").exists())
-ROS_FILES = {"node.py", "device_node.py", "diagnostics.py", "node_recorder.py", "parameters.py"}
+ROS_FILES = {"node.py", "device_node.py", "diagnostics.py", "node_recorder.py",
+             "parameter_node.py", "parameters.py"}
 ROS_NAMES = ("rclpy", "rcl_interfaces", "builtin_interfaces", "std_srvs", "launch", "launch_ros",
              "ament_index_python", "rosidl_runtime_py", "rosbag2_py")
 
