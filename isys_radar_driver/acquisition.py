@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 from driver_common import clocks as time
 from driver_common.errors import FrameError, RefusedError
+from driver_common.host_pauses import NOTEWORTHY
 from driver_common.settings import Value
 from isys_radar_driver import commands
 from isys_radar_driver.access import Access
@@ -121,6 +122,8 @@ class Acquisition:
         timeout = max(model.timeout, 1.1 * radar.cycle_time) + LATENCY
         targets, stamp = self._read_target_list(radar, resolution, timeout)
         begin = _monotonic(stamp)
+        if self._is_timeless():
+            return
         if self._objection(radar, targets, begin):
             radar.statistics.implausible_lists += 1
             return
@@ -129,15 +132,22 @@ class Acquisition:
             stamp, self._access.line.recorder.offset))
         if options.read_range_list and model.supports(commands.READ_RANGE_LIST):
             range_list, stamp = self._access.timed(radar, commands.READ_RANGE_LIST, timeout)
+            if self._is_timeless():
+                return
             if radar.limits().allow_range(range_list.range):
                 listener.on_range_list(radar, range_list, targets, stamp)
             else:
                 radar.statistics.implausible_lists += 1
         if options.read_digital_outputs and model.supports(commands.READ_DIGITAL_OUTPUTS):
             outputs, stamp = self._access.timed(radar, commands.READ_DIGITAL_OUTPUTS, timeout)
-            listener.on_digital_outputs(radar, outputs, stamp)
+            if not self._is_timeless():
+                listener.on_digital_outputs(radar, outputs, stamp)
         if missed:
             self._align(radar)
+
+    def _is_timeless(self) -> bool:
+        """Whether nobody knows when the last reply came, because this host slept meanwhile."""
+        return self._access.line.overdue > NOTEWORTHY
 
     def _read_target_list(self, radar: Radar, resolution: Resolution,
                           timeout: float) -> tuple[TargetList, int]:

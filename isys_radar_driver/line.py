@@ -53,6 +53,8 @@ class Line:
         recorder: Has what passed of late.
         stale_frames: Good frames that answered nothing.
         reply_began: Host's time in ns at which the last reply began, whole or damaged.
+        overdue: By how much later in s than it could come the last reply was read, because this
+            host was suspended or starved.
         damaged: Monotonic time in s at which something arrived damaged.
     """
 
@@ -63,6 +65,7 @@ class Line:
         self.parser = FrameParser()
         self.stale_frames = 0
         self.reply_began = 0
+        self.overdue = 0.0
         self.damaged = -math.inf
         self._link: SerialLink | None = None
         self._unanswered: dict[int, Frame] = {}  # requests whose late replies may still come
@@ -222,6 +225,7 @@ class Line:
         while data := link.read(min(deadline, end) - time.monotonic()):
             if not parser.pending:
                 self.reply_began = link.time - round(link.seconds(len(data)) * 1e9)
+                self.overdue = time.monotonic() - min(deadline, end)
             for frame in parser.feed(data):
                 yield frame, self.reply_began
             now = time.monotonic()

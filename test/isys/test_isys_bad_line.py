@@ -465,6 +465,25 @@ def test_a_radar_is_found_on_a_line_with_echo(start):
     assert Master(line.port).find().radar.address == 128
 
 
+# --- a host that sleeps ------------------------------------------------------------------------
+
+def test_a_list_that_was_read_after_a_sleep_of_the_host_is_not_published(monkeypatch):
+    """Nobody knows when it came. Here the range of the target tells when it was measured."""
+    link = VirtualLink(VirtualTime(), "iSYS-4001")
+    master = VirtualMaster(monkeypatch, link, Options())
+    link.radars[0].scene = lambda now: [Target(40.0, -1.0, 1.0 + now % 100.0, 0.0)]
+    master.measure(10)
+    for _ in range(20):
+        link.suspension = 3.0
+        master.run(4.0)
+    assert not link.suspension
+    assert master.radar.statistics.lost_cycles > 300
+    assert len(master.heard.lists) > 100
+    for _, measured, stamp in master.heard.lists:
+        late = (1e-9 * stamp - (measured.targets[0].range - 1.0)) % 100.0
+        assert -0.1 < (late + 50.0) % 100.0 - 50.0 < 0.2
+
+
 # --- several radars on one line ----------------------------------------------------------------
 
 def test_several_radars_take_turns(start):

@@ -58,6 +58,7 @@ class VirtualLink:
         replies: What the radars sent.
         noise: Bytes that come again and again, at the line's full speed.
         faults: What happens to the bytes, in both directions.
+        suspension: Time in s for which this host stands still when it has read something next.
     """
 
     def __init__(self, clock, *models, addresses=(0, 0), **options):
@@ -70,6 +71,7 @@ class VirtualLink:
         self.faults = Faults()
         self.replies = set()
         self.noise = b""
+        self.suspension = 0.0
         self._events = []
         self._order = itertools.count()
         self._arrived = bytearray()
@@ -99,6 +101,9 @@ class VirtualLink:
                 take(due, data)
             if self._arrived or self.clock.now >= end:
                 data, self._arrived = bytes(self._arrived), bytearray()
+                if data:
+                    self.clock.sleep(self.suspension)
+                    self.suspension = 0.0
                 return data
             self.clock.now = min(end, *(event[0] for event in self._events[:1]), end)
 
