@@ -181,7 +181,7 @@ class Acquisition:
         """Return why a list that began at a monotonic time in s cannot be true, or ""."""
         line = self._access.line
         objection = radar.limits(own=line.in_doubt).objection(targets)
-        if objection:
+        if radar.limits().objection(targets):  # what only its own filters object to is no damage
             line.damaged = time.monotonic()
         memory = MEMORY_CYCLES if line.in_doubt else SHORT_MEMORY
         jump = radar.continuity.follow(targets, begin, begin - memory * radar.cycle_time)

@@ -244,6 +244,20 @@ def test_in_doubt_the_radars_own_limits_count_as_well(connect):
     master.until(lambda: master.radar.statistics.implausible_lists)
 
 
+def test_doubt_ends_where_only_the_radars_own_limits_object(monkeypatch):
+    link = VirtualLink(VirtualTime(), "iSYS-4001")
+    link.radars[0].targets = lambda output, now: [Target(40.0, 1.0, 100.0, 0.0)]
+    master = VirtualMaster(monkeypatch, link, Options(wanted={"output1.range_max": 40.0}))
+    master.measure()
+    master.bus.line.damaged = link.clock.now
+    master.run(isys_line.DOUBT_TIME)
+    assert master.radar.statistics.implausible_lists > 0
+    master.run(1.0)
+    master.heard.lists.clear()
+    master.run(1.0)
+    assert len(master.heard.lists) > 10
+
+
 def test_a_line_that_is_unplugged_is_an_error_that_says_so(connect):
     master, line, _ = connect()
     master.measure()
