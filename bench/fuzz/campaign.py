@@ -77,7 +77,8 @@ def fuzz(target: Target, inputs: int, seconds: float, seed: int) -> Result:
     with Coverage() as coverage:
         while result.inputs < inputs and time.monotonic() < begin + seconds:
             known = result.inputs < len(target.seeds)
-            data = target.seeds[result.inputs] if known else invent(random, examples)
+            data = target.seeds[result.inputs] if known else invent(
+                random, examples, target.longest)
             choices = random.getrandbits(32)
             result.inputs += 1
             fault = fault_of(target, data, choices)

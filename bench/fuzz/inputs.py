@@ -14,7 +14,6 @@ from collections.abc import Callable, Sequence
 from random import Random
 
 _EDGES = (0x00, 0x01, 0x10, 0x16, 0x68, 0x7F, 0x80, 0xA2, 0xFE, 0xFF)
-_MAX_SIZE = 400  # bytes
 
 
 def _overwrite(random: Random, data: bytearray, _: bytes) -> None:
@@ -55,15 +54,15 @@ _CHANGES: tuple[Callable[[Random, bytearray, bytes], None], ...] = (
     _overwrite, _overwrite_with_edge, _flip, _insert, _delete, _repeat, _splice, _append)
 
 
-def invent(random: Random, examples: Sequence[bytes]) -> bytes:
-    """Return an example with up to six changes, or noise."""
+def invent(random: Random, examples: Sequence[bytes], longest: int) -> bytes:
+    """Return an example with up to six changes, or noise; of so many bytes at most."""
     if random.random() < 0.05:
         return random.randbytes(random.randrange(64))
     data = bytearray(random.choice(examples))
     for _ in range(random.randrange(7)):
         if data:
             random.choice(_CHANGES)(random, data, random.choice(examples))
-    return bytes(data[:_MAX_SIZE])
+    return bytes(data[:longest])
 
 
 def minimise(data: bytes, fails: Callable[[bytes], bool]) -> bytes:

@@ -25,7 +25,15 @@ import can
 from driver_common import clocks
 from driver_common.clocks import SECOND, ReplayClock
 from driver_common.errors import LinkError
-from driver_common.flight_recorder import FlightRecorder, Kind
+from driver_common.flight_recorder import (
+    EXTENDED,
+    Entry,
+    FlightRecorder,
+    Frame,
+    Kind,
+    pack_frame,
+    pack_offset,
+)
 from driver_common.serial_link import BITS_PER_BYTE
 from driver_common.simulator.bus import CanFrame
 from driver_common.simulator.line import SimulatedDevice
@@ -60,27 +68,34 @@ def pretended_time() -> Iterator[PretendedClock]:
 
 
 class PretendedRecorder(FlightRecorder):
-    """Records nothing; the offset between the clocks is that of a pretended time."""
+    """Records what passes in a pretended time.
 
-    def __init__(self, clock: ReplayClock) -> None:
-        """Take the offset of a clock."""
+    Attributes:
+        clock: The time.
+        entries: What passed.
+    """
+
+    def __init__(self, clock: PretendedClock) -> None:
+        """Begin with a link that is opened."""
         super().__init__()
-        self._clock = clock
+        self.clock = clock
         self.offset = clock.offset
+        self.entries = [Entry(clock.now, Kind.OFFSET, pack_offset(clock.offset)),
+                        Entry(clock.now, Kind.OPENED)]
 
     def add(self, now: int, kind: Kind, content: bytes = b"") -> None:
-        """Do nothing."""
-
-    def follow_offset(self) -> None:
-        """Do nothing."""
+        """Take what happened."""
+        self.entries.append(Entry(now, kind, content))
 
     def read_offset(self) -> int:
         """Return the offset, which never changes."""
+        self.add(self.clock.now, Kind.OFFSET, pack_offset(self.offset))
         return self.offset
 
     def now(self) -> int:
         """Return the time."""
-        return self._clock.now
+        self.add(self.clock.now, Kind.CLOCK)
+        return self.clock.now
 
 
 class PretendedPort:
@@ -93,11 +108,12 @@ class PretendedPort:
 
     port = "pretended"
 
-    def __init__(self, clock: ReplayClock, devices: SimulatedDevice,
+    def __init__(self, recorder: PretendedRecorder, devices: SimulatedDevice,
                  arrivals: Callable[[bytes], Sequence[tuple[float, bytes]]]) -> None:
         """Connect devices to a line; `arrivals` says what arrives in the place of an answer."""
         self.baud_rate = devices.baud_rate
-        self._clock, self._devices, self._arrivals = clock, devices, arrivals
+        self._recorder, self._clock = recorder, recorder.clock
+        self._devices, self._arrivals = devices, arrivals
         self._coming: deque[tuple[int, bytes]] = deque()  # when in ns, and what
         self._last = 0
 
@@ -112,6 +128,7 @@ class PretendedPort:
 
     def write(self, data: bytes) -> None:
         """Have the devices answer."""
+        self._recorder.add(self._clock.now, Kind.SENT, data)
         if self.baud_rate != self._devices.baud_rate:
             return
         arrived = self._clock.now / SECOND + self.seconds(len(data))
@@ -128,6 +145,7 @@ class PretendedPort:
         clock.pass_until(min(end, self._coming[0][0]) if self._coming else end)
         while self._coming and self._coming[0][0] <= clock.now:
             data += self._coming.popleft()[1]
+        self._recorder.add(clock.now, Kind.RECEIVED if data else Kind.NOTHING, data)
         return data
 
     def close(self) -> None:
@@ -147,17 +165,20 @@ class PretendedCan:
         receive_buffer: Not known.
     """
 
-    def __init__(self, clock: ReplayClock, network: SimulatedNetwork,
+    def __init__(self, recorder: PretendedRecorder, network: SimulatedNetwork,
                  arrivals: Callable[[CanFrame], Sequence[tuple[float, CanFrame]]]) -> None:
         """Connect a network to a bus; `arrivals` says what arrives in the place of a frame."""
-        self.arrived = self.heard = clock.now
+        self.arrived = self.heard = recorder.clock.now
         self.receive_buffer = 0
-        self._clock, self._network, self._arrivals = clock, network, arrivals
+        self._recorder, self._clock = recorder, recorder.clock
+        self._network, self._arrivals = network, arrivals
         self._coming: list[tuple[int, int, CanFrame]] = []  # when in ns, and what
         self._order = itertools.count()
 
     def send(self, identifier: int, data: bytes) -> None:
         """Have the network answer."""
+        self._recorder.add(self._clock.now, Kind.SENT,
+                           pack_frame(Frame(0.0, identifier | EXTENDED, data)))
         self._network.receive(CanFrame(identifier, data), self._clock.now / SECOND)
 
     def receive(self, timeout: float) -> can.Message | None:
@@ -169,6 +190,7 @@ class PretendedCan:
                 return self._message(*heapq.heappop(self._coming))
             if self._clock.now >= end:
                 self.arrived = self._clock.now
+                self._recorder.add(self.arrived, Kind.NOTHING)
                 return None
             due = self._network.next_due(self._clock.now / SECOND)
             times = [end, *([] if due is None else [math.ceil(due * SECOND)]),
@@ -183,8 +205,12 @@ class PretendedCan:
 
     def _message(self, when: int, number: int, frame: CanFrame) -> can.Message:
         self.arrived = self.heard = self._clock.now
+        bus_time = (when + self._clock.offset) / SECOND
+        if frame.extended and not frame.error:
+            self._recorder.add(self.arrived, Kind.RECEIVED, pack_frame(
+                Frame(bus_time, frame.can_id | EXTENDED, frame.data)))
         return can.Message(
-            timestamp=(when + self._clock.offset) / SECOND, arbitration_id=frame.can_id,
+            timestamp=bus_time, arbitration_id=frame.can_id,
             is_extended_id=frame.extended, is_error_frame=frame.error, data=frame.data)
 
     def close(self) -> None:

@@ -22,11 +22,17 @@ from random import Random
 from typing import Any, Protocol
 from unittest.mock import patch
 
-from bench.fuzz.pretended import PretendedCan, PretendedPort, PretendedRecorder, pretended_time
+from bench.fuzz.pretended import (
+    PretendedCan,
+    PretendedClock,
+    PretendedPort,
+    PretendedRecorder,
+    pretended_time,
+)
 from bench.fuzz.script import KINDS, Arrival, Kind, Script
 from bench.fuzz.target import Target
 from driver_common import clocks
-from driver_common.clocks import SECOND, ReplayClock
+from driver_common.clocks import SECOND
 from driver_common.errors import DriverError
 from driver_common.simulator.bus import EXTENDED_ID, CanFrame
 from icotronic_driver import line as icotronic_line
@@ -85,7 +91,7 @@ class _Bus(Protocol):
 class Play:
     """A bus that is polled as its thread would do it."""
 
-    def __init__(self, bus: _Bus, clock: ReplayClock) -> None:
+    def __init__(self, bus: _Bus, clock: PretendedClock) -> None:
         """Open a bus."""
         self._bus, self._clock = bus, clock
         bus.open()
@@ -132,7 +138,7 @@ def _in_order(some: Iterable[object], all_: Iterable[object]) -> bool:
 # --- radars ---
 
 class _HeardRadars(RadarListener):
-    def __init__(self, clock: ReplayClock) -> None:
+    def __init__(self, clock: PretendedClock) -> None:
         self.lists: list[tuple[int, TargetList]] = []
         self._clock = clock
 
@@ -186,11 +192,12 @@ def _check_radars(data: bytes, random: Random) -> None:
         def reset() -> None:
             random.choice(radars).power_cycle(clock.now / SECOND)
 
-        link = PretendedPort(clock, SimulatedRadars(radars), lambda reply: script.answer(
+        recorder = PretendedRecorder(clock)
+        link = PretendedPort(recorder, SimulatedRadars(radars), lambda reply: script.answer(
             reply, _other_radar, _radar_refusal, reset))
         heard = _HeardRadars(clock)
         with patch.object(isys_line, "open_serial", lambda *_: link), patch.object(
-                isys_line, "serial_recorder", lambda _: PretendedRecorder(clock)):
+                isys_line, "serial_recorder", lambda _: recorder):
             bus = RadarBus("pretended", model.baud_rate, [
                 RadarOptions(f"r{address}", address=address) for address in addresses], heard)
             bus.active = True
@@ -210,7 +217,7 @@ UNCERTAIN = (Kind.GARBAGE, Kind.NOISE, Kind.CUT, Kind.FOREIGN, Kind.TWICE)
 
 
 class _HeardSensors(Uc4000Listener):
-    def __init__(self, clock: ReplayClock) -> None:
+    def __init__(self, clock: PretendedClock) -> None:
         self.measurements: list[tuple[int, Measurement]] = []
         self._clock = clock
 
@@ -235,11 +242,12 @@ def _check_sensors(data: bytes, random: Random) -> None:
         def reset() -> None:
             random.choice(sensors).power_cycle(clock.now / SECOND)
 
-        link = PretendedPort(clock, SimulatedSensors(sensors), lambda reply: script.answer(
+        recorder = PretendedRecorder(clock)
+        link = PretendedPort(recorder, SimulatedSensors(sensors), lambda reply: script.answer(
             reply, lambda _: bytes.fromhex("A8 00 00 43"), _refused_by_sensor, reset))
         heard = _HeardSensors(clock)
         with patch.object(uc4000_line, "open_serial", lambda *_: link), patch.object(
-                uc4000_line, "serial_recorder", lambda _: PretendedRecorder(clock)):
+                uc4000_line, "serial_recorder", lambda _: recorder):
             bus = Uc4000Bus("pretended", [
                 Uc4000Options(f"s{address}", address=address) for address in addresses], heard)
             bus.active = True
@@ -257,7 +265,7 @@ CHANNELS = ("x", "xyz", "yz")
 
 
 class _HeardStream(IcotronicListener):
-    def __init__(self, clock: ReplayClock) -> None:
+    def __init__(self, clock: PretendedClock) -> None:
         self.values: list[tuple[int, ...]] = []
         self._clock = clock
 
@@ -317,9 +325,10 @@ def _check_network(data: bytes, random: Random) -> None:
             node.boot(clock.now / SECOND - 10.0)
         frames = _Frames(script, lambda: network.power_loss(
             random.choice((network.stu, sensor)), clock.now / SECOND))
-        link, heard = PretendedCan(clock, network, frames.arrivals), _HeardStream(clock)
+        recorder, heard = PretendedRecorder(clock), _HeardStream(clock)
+        link = PretendedCan(recorder, network, frames.arrivals)
         with patch.object(icotronic_line, "open_can", lambda *_: link), patch.object(
-                icotronic_line, "can_recorder", lambda *_: PretendedRecorder(clock)):
+                icotronic_line, "can_recorder", lambda *_: recorder):
             bus = IcotronicBus(icotronic_line.Line("socketcan", "can0", 1_000_000, ()),
                                icotronic_sensor.Options(channels=random.choice(CHANNELS),
                                                         sample_rate=150.0), heard)

@@ -25,11 +25,13 @@ class Target:
             answers, as the codecs promise them. What it chooses at random it takes from the second
             argument.
         seeds: Inputs to begin with; some of them are good, some nearly so.
+        longest: Most bytes of an input.
     """
 
     name: str
     check: Callable[[bytes, Random], None]
     seeds: Sequence[bytes]
+    longest: int = 400
 
 
 def from_hex(texts: Iterable[str]) -> list[bytes]:
