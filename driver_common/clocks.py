@@ -57,7 +57,8 @@ class ReplayClock:
     def pass_until(self, to: int) -> None:
         """Let time pass until then."""
         self.now = max(self.now, to)
-        time.sleep(self.behind)
+        if behind := self.behind:
+            time.sleep(behind)
 
     @property
     def behind(self) -> float:

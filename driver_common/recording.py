@@ -133,7 +133,8 @@ class RecordingText:
         shown = round(bus_time * 1e6) if entry.kind is Kind.RECEIVED else now // 1000
         delay = str(now - shown * 1000)
         if entry.kind is Kind.RECEIVED and shown / 1e6 != bus_time:
-            delay += f"/{round(bus_time * 1e9) - shown * 1000}"
+            ticks, per_second = bus_time.as_integer_ratio()  # a product of floats would round
+            delay += f"/{(2 * ticks * SECOND // per_second + 1) // 2 - shown * 1000}"
         self._delays.append(delay)
         self._length += len(delay) + 1
         digits = f"{identifier & ~EXTENDED & ~REMOTE:0{8 if identifier & EXTENDED else 3}X}"
@@ -260,7 +261,7 @@ class _Reader:
             entry = self._entries[place]
             if rest:
                 frame = frame_of(entry.content)
-                bus_time = (round(frame.bus_time * 1e6) * 1000 + int(rest)) / 1e9
+                bus_time = (round(frame.bus_time * 1e6) * 1000 + int(rest)) / SECOND
                 entry = entry._replace(content=pack_frame(frame._replace(bus_time=bus_time)))
             self._entries[place] = entry._replace(time=entry.time + int(delay))
         self._undelayed.clear()

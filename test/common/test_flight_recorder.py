@@ -204,6 +204,8 @@ CAN_ENTRIES = [
     frame(6 * SECOND, Kind.RECEIVED, 0x123, b""),
     frame(6 * SECOND, Kind.RECEIVED, 0x14C00DC1 | EXTENDED | REMOTE, b""),
     frame(6 * SECOND, Kind.RECEIVED, ERROR | EXTENDED | 0x40, bytes(8)),
+    frame(6 * SECOND, Kind.RECEIVED, bus_time=1700001000.3220038),
+    frame(6 * SECOND, Kind.RECEIVED, bus_time=1700001000.5340059),
     *[frame(7 * SECOND + number, Kind.RECEIVED) for number in range(200)],
 ]
 
