@@ -28,7 +28,7 @@ from bench.fuzz.pretended import (
     PretendedRecorder,
     pretended_time,
 )
-from bench.fuzz.sessions import Play
+from bench.fuzz.sessions import RECOVERY_TIME, Play
 from bench.fuzz.target import Target
 from driver_common import clocks
 from driver_common.errors import DriverError, LinkError, SettingError
@@ -54,7 +54,7 @@ from uc4000_driver.session import Uc4000Bus
 from uc4000_driver.simulator.line import SimulatedSensors
 from uc4000_driver.simulator.sensor import SimulatedSensor
 
-RECORDED = 3.0  # s of a session
+RECORDED = 1.0  # s of a session in which a device was found
 MOST_STEPS = 3000  # of a replay; one that goes on has a gap of years in it
 
 # The telegrams are those of the manual of the UC4000, sections 4.5.3 and 5.1.6.3; the frames those
@@ -184,7 +184,9 @@ def _recorded(number: int) -> Sequence[Entry]:
                 driver.lines, driver.make_recorder, lambda *_: recorder):
             bus = driver.make_bus(None)
             bus.active = True
-            Play(bus, clock).until(lambda: False, RECORDED)
+            play = Play(bus, clock)
+            play.until(lambda: bus.devices[0].is_connected, RECOVERY_TIME)
+            play.until(lambda: False, RECORDED)
     return recorder.entries
 
 
