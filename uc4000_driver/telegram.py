@@ -193,7 +193,7 @@ class ReplyParser:
         """Take note of a silence: what is not complete now never will be."""
         self._own = b""
         self._take_replies()
-        if self._length > SHORT_REPLY and len(self._buffer) == SHORT_REPLY:
+        if not self.complete and SHORT_REPLY == len(self._buffer) < self._length:
             # The beginning of a text can look like a refusal ("HW" does); no code is a letter.
             reply = decoded(self._buffer)
             if reply and not reply.acknowledged and not 0x20 <= reply.data[0] < 0x7F:

@@ -323,6 +323,12 @@ def test_bytes_behind_a_reply_are_seen() -> None:
     assert _parse(2, [bytes.fromhex("23 D1 23 D1")]).pending == bytes.fromhex("23 D1")
 
 
+def test_a_refusal_behind_the_only_reply_is_no_reply() -> None:
+    parser = _parse(19, [VERSION + bytes.fromhex("04 7F"), b""])
+    assert [reply.encode() for reply in parser.replies] == [VERSION]
+    assert parser.damaged == bytes.fromhex("04 7F")
+
+
 @pytest.mark.parametrize("front", ["23 D1", "23 D1 01 7C", "00 FF 55", "48 57"])
 def test_a_long_reply_is_found_behind_older_bytes(front: str) -> None:
     old = bytes.fromhex(front)
