@@ -19,7 +19,7 @@ from rclpy.lifecycle import LifecycleNode
 from rclpy.parameter import Parameter as RosParameter
 
 from driver_common.errors import DriverError, SettingError
-from driver_common.parameters import ParameterStore, refusal
+from driver_common.parameters import ParameterStore, refusal, refuse_unknown_types
 from driver_common.recording import read_recording
 from driver_common.replay import recording_path
 from driver_common.settings import Option, Setting, Value
@@ -56,6 +56,7 @@ class ParameterNode(LifecycleNode):
         super().__init__(name)
         self.bus: Any = None
         self.store = ParameterStore(self)
+        refuse_unknown_types(self)
         self._devices: dict[str, Any] = {}  # by the names of the parameters that are its settings
         self._take_recorded_parameters()
         self._declare_options()

@@ -10,7 +10,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from typing import Any
 
 from rcl_interfaces.msg import (
@@ -19,11 +20,15 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
 from driver_common.errors import DriverError, SettingError
 from driver_common.settings import Parameter, Setting, Value, suggestion
+
+SetCallback = Callable[[Any, Any], Any]
 
 _TYPES = {bool: RosParameter.Type.BOOL, int: RosParameter.Type.INTEGER,
           float: RosParameter.Type.DOUBLE, str: RosParameter.Type.STRING,
@@ -160,6 +165,40 @@ class ParameterStore:
         names = [prefix + name for name in known]
         return [f"parameter {name}: {owner} has no such parameter{suggestion(name, names)}"
                 for name in self.overrides if name.startswith(prefix) and name not in names]
+
+
+def refuse_unknown_types(node: Node) -> None:
+    """Have the services of a node refuse values of a type that ROS has not; rclpy ends the node."""
+    def set_each(callback: SetCallback, request: SetParameters.Request,
+                 response: SetParameters.Response) -> SetParameters.Response:
+        for parameter in request.parameters:
+            if fault := _unknown_type(parameter):
+                response.results.append(refusal(fault))
+            else:
+                callback(SetParameters.Request(parameters=[parameter]), response)
+        return response
+
+    def set_all(callback: SetCallback, request: SetParametersAtomically.Request,
+                response: SetParametersAtomically.Response) -> SetParametersAtomically.Response:
+        fault = next(filter(None, map(_unknown_type, request.parameters)), None)
+        if fault is None:
+            return callback(request, response)
+        response.result = refusal(fault)
+        return response
+
+    handlers = {SetParameters: set_each, SetParametersAtomically: set_all}
+    for service in node.services:
+        if service.srv_type in handlers:
+            service.callback = partial(handlers[service.srv_type], service.callback)
+
+
+def _unknown_type(parameter: ParameterMessage) -> SettingError | None:
+    try:
+        RosParameter.Type(parameter.value.type)
+    except ValueError:
+        return SettingError(f"{parameter.name} has a value of type {parameter.value.type}, which "
+                            "ROS does not have")
+    return None
 
 
 def refusal(error: DriverError) -> SetParametersResult:
