@@ -41,10 +41,11 @@ from isys_radar_driver.targets import (
 )
 
 COMMANDS = [one for one in vars(commands).values() if isinstance(one, Command)]
-SETTINGS: dict[IsysRecord, list[Setting]] = {}  # of all models, by where they live
+RECORDS: dict[tuple[str, IsysRecord], list[Setting]] = {}  # settings by model and record
 for _model in MODELS.values():
     for _setting in settings_of(_model).values():
-        SETTINGS.setdefault(record_of(_setting), []).append(_setting)
+        RECORDS.setdefault((_model.name, record_of(_setting)), []).append(_setting)
+KEYS, LOCATIONS = tuple(RECORDS), tuple(Location)
 FRAMES = from_hex(example.frame for example in EXAMPLES + HAND_TYPED)
 RAW_SIGNALS = from_hex(("A2 01 80 E0 01 01 02 00 00 00 0A" + " 00" * 32 + " 6E 16",))  # table 35
 
@@ -102,13 +103,14 @@ def _check_replies(data: bytes, random: Random) -> None:
 
 
 def _check_settings(data: bytes, random: Random) -> None:
-    record, location = random.choice(tuple(SETTINGS)), random.choice(tuple(Location))
+    key, location = random.choice(KEYS), random.choice(LOCATIONS)
+    record = key[1]
     for pdu in (data, data[:record.size].ljust(record.size, b"\0")):
         with contextlib.suppress(FrameError):
             raws = record.decode_reply(pdu, location)
             assert record.pack(raws) == pdu[-record.size:]
             assert record.write_request(2, raws, location).pdu.endswith(pdu[-record.size:])
-            for setting in SETTINGS[record]:
+            for setting in RECORDS[key]:
                 check_raws(setting, raws[setting.field])
 
 

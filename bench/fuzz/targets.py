@@ -10,13 +10,13 @@
 
 from __future__ import annotations
 
-from bench.fuzz import icotronic, isys, recordings, sessions, settings, uc4000
+from bench.fuzz import icotronic, isys, parameters, recordings, sessions, settings, uc4000
 from bench.fuzz.campaign import Result, fuzz
 from bench.fuzz.target import Target
 
 TARGETS: tuple[Target, ...] = (
     *isys.TARGETS, *icotronic.TARGETS, *uc4000.TARGETS, *settings.TARGETS, *recordings.TARGETS,
-    *sessions.TARGETS)
+    *sessions.TARGETS, *parameters.TARGETS)
 
 
 def fuzz_named(name: str, inputs: int, seconds: float, seed: int) -> Result:

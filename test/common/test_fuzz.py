@@ -23,6 +23,7 @@ from bench.fuzz.targets import TARGETS
 from isys_radar_driver.frames import FrameParser
 
 SLOW = "session", "replays"
+SERVICES = "parameter services"  # in a process of its own, because of the middleware
 
 
 def refuse_zeros(data, random):
@@ -37,7 +38,8 @@ def planted(monkeypatch):
     return target
 
 
-@pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.name)
+@pytest.mark.parametrize("target", [one for one in TARGETS if one.name != SERVICES],
+                         ids=lambda target: target.name)
 def test_a_target_keeps_its_promises(target):
     inputs = 10 if target.name.endswith(SLOW) else len(target.seeds) + 100
     result = fuzz(target, inputs, 60.0, seed=2)
@@ -71,6 +73,11 @@ def test_a_file_that_keeps_no_failure(tmp_path, content, words):
     path.write_text(content)
     with pytest.raises(SystemExit, match=words):
         program.main([str(path)])
+
+
+def test_the_parameter_services_keep_their_promises(tmp_path, capsys):
+    assert program.main(["--inputs", "40", "--only", SERVICES, "--keep", str(tmp_path)]) == 0
+    assert " 40 " in capsys.readouterr().out
 
 
 @pytest.mark.skipif(sys.version_info < (3, 12), reason="this Python does not tell what is reached")
