@@ -14,12 +14,13 @@ nothing is published that no device measured, and once they behave again they ar
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import struct
-from collections.abc import Callable, Iterable
-from dataclasses import replace
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import asdict, replace
 from random import Random
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 from unittest.mock import patch
 
 from bench.fuzz.pretended import (
@@ -34,6 +35,7 @@ from bench.fuzz.target import Target
 from driver_common import clocks
 from driver_common.clocks import SECOND
 from driver_common.errors import DriverError
+from driver_common.settings import Value
 from driver_common.simulator.bus import EXTENDED_ID, CanFrame
 from icotronic_driver import line as icotronic_line
 from icotronic_driver import sensor as icotronic_sensor
@@ -54,10 +56,11 @@ from isys_radar_driver.frames import (
     FrameParser,
 )
 from isys_radar_driver.listener import Listener as RadarListener
-from isys_radar_driver.models import MODELS
+from isys_radar_driver.models import MODELS, Model
 from isys_radar_driver.radar import Options as RadarOptions
 from isys_radar_driver.radar import Radar
 from isys_radar_driver.session import RadarBus
+from isys_radar_driver.settings import settings_of
 from isys_radar_driver.simulator.line import SimulatedRadars
 from isys_radar_driver.simulator.radar import SimulatedRadar
 from isys_radar_driver.targets import Target as RadarTarget
@@ -75,6 +78,7 @@ from uc4000_driver.telegram import ErrorCode, Reply
 PLAY_TIME = 20.0  # s for a script, at most
 RECOVERY_TIME = 120.0  # s until all is well again behind it
 LONGEST_STEP = 60.0  # s
+OFTEN = 0.05  # of the steps after which a user writes something
 ENOUGH = 3  # measurements that tell that all is well
 
 
@@ -85,7 +89,24 @@ class _Bus(Protocol):
 
     def open(self) -> None: ...
     def poll(self) -> float: ...
+    def write(self, device: Any, changes: Mapping[str, Value]) -> object: ...
     def close(self) -> None: ...
+
+
+class Act(NamedTuple):
+    """What is played.
+
+    Attributes:
+        late: Whether the script begins when measurements come, and not at the first answer.
+        changes: Settings that a user writes meanwhile.
+        value: Returns the value of a setting that the simulated device behind a device has.
+        uncertain: Kinds after which the driver may hold other values than the device.
+    """
+
+    late: bool
+    changes: Mapping[str, Value]
+    value: Callable[[Any, str], Value]
+    uncertain: Collection[Kind]
 
 
 class Play:
@@ -95,6 +116,28 @@ class Play:
         """Open a bus."""
         self._bus, self._clock = bus, clock
         bus.open()
+
+    def act(self, act: Act, script: Script, heard: list[Any], random: Random) -> None:
+        """Have the devices do what the script says, and assert that all is well again then."""
+        devices = self._bus.devices
+        if act.late:
+            self.until(lambda: len(heard) >= ENOUGH, PLAY_TIME)
+        end = self._clock.now + PLAY_TIME * SECOND
+        while not script.is_over and self._clock.now < end:
+            self._step()
+            if random.random() < OFTEN:  # a user changes something
+                with contextlib.suppress(DriverError):
+                    self._bus.write(random.choice(devices), act.changes)
+        script.end()
+        begin = len(heard)
+        well = self.until(lambda: len(heard) >= begin + ENOUGH * len(devices) and all(
+            device.is_connected and device.error is None for device in devices), RECOVERY_TIME)
+        assert well, [(str(device), device.error) for device in devices]
+        if not any(script.done[kind] for kind in act.uncertain):
+            for device in devices:
+                for name, value in device.values.items():
+                    assert value in ("unknown", act.value(device, name)), name
+        self._bus.close()
 
     def until(self, condition: Callable[[], bool], seconds: float) -> bool:
         """Poll until a condition holds; return False where it does not within some s."""
@@ -115,19 +158,6 @@ class Play:
         assert self._clock.now - before < LONGEST_STEP * SECOND
         clocks.sleep(min(pause, 1.0))
 
-    def act(self, script: Script, heard: list[Any], count: int, *, late: bool) -> None:
-        """Have the devices do what the script says, and assert that all is well again then."""
-        if late:
-            self.until(lambda: len(heard) >= ENOUGH, PLAY_TIME)
-        self.until(lambda: script.is_over, PLAY_TIME)
-        script.end()
-        begin = len(heard)
-        well = self.until(lambda: len(heard) >= begin + ENOUGH * count and all(
-            device.is_connected and device.error is None for device in self._bus.devices),
-            RECOVERY_TIME)
-        assert well, [(str(device), device.error) for device in self._bus.devices]
-        self._bus.close()
-
 
 def _in_order(some: Iterable[object], all_: Iterable[object]) -> bool:
     """Whether some things are among all, in their order, and none of them twice."""
@@ -136,6 +166,11 @@ def _in_order(some: Iterable[object], all_: Iterable[object]) -> bool:
 
 
 # --- radars ---
+
+CHANGES: Mapping[str, Sequence[Value]] = {
+    "frequency_channel": (1, 2), "threshold_minimum_db": (11.0, 12.5),
+    "output1.velocity_max": (11.0, 9.0), "output1.range_max": (8.0, 9.0),
+    "output1.direction": ("both", "approaching"), "output1.filter_type": ("mean", "min")}
 
 class _HeardRadars(RadarListener):
     def __init__(self, clock: PretendedClock) -> None:
@@ -179,6 +214,13 @@ def _radar_refusal(reply: bytes) -> bytes:
     return Frame(MASTER, source, FAILURE).encode()
 
 
+def _changes(model: Model, random: Random) -> dict[str, Value]:
+    """Return a change of one of the settings of a model."""
+    settings = settings_of(model)
+    name = random.choice(sorted(settings.keys() & CHANGES.keys()))
+    return {name: random.choice(CHANGES[name])}
+
+
 def _check_radars(data: bytes, random: Random) -> None:
     model = random.choice([model for model in MODELS.values() if model.has_target_lists])
     addresses = random.choice(((0,), (10,), (10, 11)))
@@ -199,9 +241,16 @@ def _check_radars(data: bytes, random: Random) -> None:
         with patch.object(isys_line, "open_serial", lambda *_: link), patch.object(
                 isys_line, "serial_recorder", lambda _: recorder):
             bus = RadarBus("pretended", model.baud_rate, [
-                RadarOptions(f"r{address}", address=address) for address in addresses], heard)
+                RadarOptions(f"r{address}", address=address,
+                             read_range_list=random.random() < 0.3,
+                             read_digital_outputs=random.random() < 0.3)
+                for address in addresses], heard)
             bus.active = True
-            Play(bus, clock).act(script, heard.lists, len(radars), late=bool(data[:1] > b"\x7f"))
+            by_address = {radar.address: radar for radar in radars}
+            Play(bus, clock).act(
+                Act(data[:1] > b"\x7f", _changes(model, random),
+                    lambda radar, name: by_address[radar.address].value(name),
+                    (Kind.TWICE, Kind.RESET)), script, heard.lists, random)
     for radar in radars:
         told = [targets for address, targets in heard.lists if address == radar.address]
         if script.done[Kind.TWICE]:
@@ -251,8 +300,11 @@ def _check_sensors(data: bytes, random: Random) -> None:
             bus = Uc4000Bus("pretended", [
                 Uc4000Options(f"s{address}", address=address) for address in addresses], heard)
             bus.active = True
-            Play(bus, clock).act(script, heard.measurements, len(sensors),
-                                 late=bool(data[:1] > b"\x7f"))
+            by_address = {sensor.address: sensor for sensor in sensors}
+            Play(bus, clock).act(
+                Act(data[:1] > b"\x7f", {"gain_db": random.choice((70.0, 72.0))},
+                    lambda sensor, name: by_address[sensor.address].value(name), UNCERTAIN),
+                script, heard.measurements, random)
     if not any(script.done[kind] for kind in UNCERTAIN):
         for address, measurement in heard.measurements:
             assert measurement.distance.outcome is Outcome.ECHO
@@ -313,6 +365,12 @@ def _refused_by_node(answer: bytes) -> bytes:
     return identifier.encode().to_bytes(4, "big") + bytes.fromhex("02 00 00 00 00 00 00 00")
 
 
+def _held(sensor: SimulatedSth) -> dict[str, Value]:
+    """Return what a simulated sensor has in its RAM."""
+    return {"led": "enabled" if sensor.led else "disabled",
+            **{f"adc.{name}": value for name, value in asdict(sensor.adc).items()}}
+
+
 def _check_network(data: bytes, random: Random) -> None:
     sensor = SimulatedSth("Test-STH", FIRST_MAC)
     network, script = SimulatedNetwork([sensor]), Script(data[1:], random)
@@ -333,7 +391,10 @@ def _check_network(data: bytes, random: Random) -> None:
                                icotronic_sensor.Options(channels=random.choice(CHANNELS),
                                                         sample_rate=150.0), heard)
             bus.active = True
-            Play(bus, clock).act(script, heard.values, 1, late=bool(data[:1] > b"\x7f"))
+            Play(bus, clock).act(
+                Act(data[:1] > b"\x7f", {"led": random.choice(("enabled", "disabled"))},
+                    lambda device, name: _held(sensor).get(name, device.values[name]),
+                    (Kind.RESET, Kind.TWICE)), script, heard.values, random)
     for values in heard.values:
         assert struct.pack(f"<{len(values)}H", *values) in frames.streamed
 
