@@ -38,7 +38,8 @@ ANSWERS = from_hex([*(example.answer for example in EXAMPLES),
 IDENTIFIERS = [number.to_bytes(4, "big") for example in EXAMPLES
                for number in (example.request_id, example.answer_id)]
 STREAMS = from_hex([
-    *(example.answer for example in STREAMING if len(example.answer) > 2),
+    *(example.answer for example in STREAMING if len(example.answer) > len("E6 00")),
+    "E6 00" + " 01 02 03" * 20 + " 00 00",  # CAN-FD
     # frames of sections 10.3.2 and 10.3.3, one behind the other
     "A2 00 01 80 02 80 03 80 A2 01 04 80 05 80 06 80 A2 02 07 80 08 80 09 80",
     "B9 FE 01 80 02 80 03 80 B9 FF 01 80 02 80 03 80 B9 00 01 80 02 80 03 80",

@@ -47,7 +47,8 @@ for _model in MODELS.values():
         RECORDS.setdefault((_model.name, record_of(_setting)), []).append(_setting)
 KEYS, LOCATIONS = tuple(RECORDS), tuple(Location)
 FRAMES = from_hex(example.frame for example in EXAMPLES + HAND_TYPED)
-RAW_SIGNALS = from_hex(("A2 01 80 E0 01 01 02 00 00 00 0A" + " 00" * 32 + " 6E 16",))  # table 35
+RAW_SIGNALS = from_hex((  # section 3.3.10: one signal, one block of 16 samples of 2 bytes
+    "A2 01 80 E0 01 01 02 00 00 00 0A" + " 00" * 32 + " 6F 16",))
 
 
 def _pdus(function_codes: range) -> list[bytes]:

@@ -16,11 +16,14 @@ import sys
 import pytest
 
 from bench.fuzz import __main__ as program
+from bench.fuzz import icotronic, isys, uc4000
 from bench.fuzz.campaign import fuzz
 from bench.fuzz.failures import keep, read_failure
 from bench.fuzz.target import Target
 from bench.fuzz.targets import TARGETS
+from icotronic_driver.streaming import StreamFormat
 from isys_radar_driver.frames import FrameParser
+from uc4000_driver.telegram import Request, decoded
 
 SLOW = "session", "replays"
 SERVICES = "parameter services"  # in a process of its own, because of the middleware
@@ -73,6 +76,15 @@ def test_a_file_that_keeps_no_failure(tmp_path, content, words):
     path.write_text(content)
     with pytest.raises(SystemExit, match=words):
         program.main([str(path)])
+
+
+def test_seeds_are_what_a_target_takes():
+    for seed in isys.FRAMES + isys.RAW_SIGNALS:
+        assert [*FrameParser().feed(seed)] or [*FrameParser(0).feed(seed)], seed.hex()
+    assert all(decoded(seed) for seed in uc4000.ANSWERS)
+    assert all(Request.decode(seed) for seed in uc4000.ASKED)
+    assert all(StreamFormat.decode(seed[0]).frame_length <= len(seed)
+               for seed in icotronic.STREAMS)
 
 
 def test_the_parameter_services_keep_their_promises(tmp_path, capsys):
