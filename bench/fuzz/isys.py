@@ -57,7 +57,17 @@ def _pdus(function_codes: range) -> list[bytes]:
     return [*dict.fromkeys(pdus)]
 
 
+def _framed(data: bytes, random: Random) -> bytes:
+    """Return an input as the body of a frame whose checksum is good, with the rest around it."""
+    start = random.randrange(len(data))
+    body = data[start:start + random.randint(3, 252)]
+    head = random.choice((b"\x10", b"\xa2", bytes((0x68, len(body), len(body), 0x68))))
+    return data[:start] + head + body + bytes((sum(body) % 256, 0x16)) + data[start + len(body):]
+
+
 def _check_frames(data: bytes, random: Random) -> None:
+    if data and random.random() < 0.3:
+        data = _framed(data, random)
     fixed_targets = random.choice((None, 0, 3))
     whole, parts = FrameParser(fixed_targets), FrameParser(fixed_targets)
     whole.raw_signals = parts.raw_signals = random.random() < 0.5
