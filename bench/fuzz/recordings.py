@@ -19,8 +19,8 @@ from pathlib import Path
 from random import Random
 from types import ModuleType
 from typing import Any, NamedTuple
-from unittest.mock import patch
 
+from bench.fuzz.play import RECOVERY_TIME, Play, linked
 from bench.fuzz.pretended import (
     EPOCH,
     PretendedCan,
@@ -28,7 +28,6 @@ from bench.fuzz.pretended import (
     PretendedRecorder,
     pretended_time,
 )
-from bench.fuzz.sessions import RECOVERY_TIME, Play
 from bench.fuzz.target import Target
 from driver_common import clocks
 from driver_common.errors import DriverError, LinkError, SettingError
@@ -131,8 +130,6 @@ class _Driver(NamedTuple):
 
     link: str
     lines: ModuleType
-    open_link: str
-    make_recorder: str
     make_link: Callable[[PretendedRecorder], object]
     make_bus: Callable[[Path | None], Any]
 
@@ -160,16 +157,16 @@ def _icotronic_bus(path: Path | None) -> IcotronicBus:
 
 
 DRIVERS = (
-    _Driver(SERIAL, isys_line, "open_serial", "serial_recorder",
+    _Driver(SERIAL, isys_line,
             lambda recorder: PretendedPort(
                 recorder, SimulatedRadars([SimulatedRadar(find_model("iSYS-6003"))]),
                 lambda reply: [(0.0, reply)]),
             lambda path: RadarBus(_port(path), 115200, [RadarOptions()], RadarListener())),
-    _Driver(SERIAL, uc4000_line, "open_serial", "serial_recorder",
+    _Driver(SERIAL, uc4000_line,
             lambda recorder: PretendedPort(
                 recorder, SimulatedSensors([SimulatedSensor(7)]), lambda reply: [(0.0, reply)]),
             lambda path: Uc4000Bus(_port(path), [Uc4000Options(address=7)], Uc4000Listener())),
-    _Driver(CAN, icotronic_line, "open_can", "can_recorder", _network, _icotronic_bus),
+    _Driver(CAN, icotronic_line, _network, _icotronic_bus),
 )
 
 
@@ -180,8 +177,7 @@ def _recorded(number: int) -> Sequence[Entry]:
     with pretended_time() as clock:
         recorder = PretendedRecorder(clock)
         link = driver.make_link(recorder)
-        with patch.object(driver.lines, driver.open_link, lambda *_: link), patch.object(
-                driver.lines, driver.make_recorder, lambda *_: recorder):
+        with linked(driver.lines, driver.link, link, recorder):
             bus = driver.make_bus(None)
             bus.active = True
             play = Play(bus, clock)

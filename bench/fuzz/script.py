@@ -53,11 +53,13 @@ class Script:
 
     Attributes:
         done: How often each kind came.
+        waits: Whether it has not begun.
     """
 
     def __init__(self, data: bytes, random: Random) -> None:
         """Read a script; what is left open is random."""
         self.done: Counter[Kind] = Counter()
+        self.waits = False
         self._steps = list(zip(data[::2], data[1::2], strict=False))
         self._random = random
         self._right = 0
@@ -74,6 +76,8 @@ class Script:
 
     def step(self) -> tuple[Kind, int]:
         """Return what becomes of the next answer, and how much of it, 0 … 255."""
+        if self.waits:
+            return Kind.RIGHT, 0
         if self._right or not self._steps:
             self._right = max(0, self._right - 1)
             return Kind.RIGHT, 0

@@ -10,13 +10,23 @@
 
 from __future__ import annotations
 
-from bench.fuzz import icotronic, isys, parameters, recordings, sessions, settings, uc4000
+from bench.fuzz import (
+    icotronic,
+    icotronic_session,
+    isys,
+    isys_session,
+    parameters,
+    recordings,
+    settings,
+    uc4000,
+    uc4000_session,
+)
 from bench.fuzz.campaign import Result, fuzz
 from bench.fuzz.target import Target
 
-TARGETS: tuple[Target, ...] = (
-    *isys.TARGETS, *icotronic.TARGETS, *uc4000.TARGETS, *settings.TARGETS, *recordings.TARGETS,
-    *sessions.TARGETS, *parameters.TARGETS)
+TARGETS: tuple[Target, ...] = tuple(target for module in (
+    isys, icotronic, uc4000, settings, recordings, isys_session, icotronic_session, uc4000_session,
+    parameters) for target in module.TARGETS)
 
 
 def fuzz_named(name: str, inputs: int, seconds: float, seed: int) -> Result:
