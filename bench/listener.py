@@ -13,13 +13,15 @@ from __future__ import annotations
 import contextlib
 import sys
 import threading
+from typing import Any
 
 import rclpy
 from rclpy.executors import ExternalShutdownException
 from rclpy.qos import QoSProfile
-from sensor_msgs.msg import Imu, PointCloud2
+from sensor_msgs.msg import Imu, PointCloud2, Range
 
 DEPTH = 2000  # messages
+KINDS = {"batch": PointCloud2, "points": PointCloud2, "range": Range}  # by topic, or an Imu
 
 
 def main() -> None:
@@ -27,7 +29,7 @@ def main() -> None:
     topic = sys.argv[1]
     count, some = 0, threading.Event()
 
-    def on_sample(_: Imu) -> None:
+    def on_sample(_: Any) -> None:
         nonlocal count
         count += 1
         some.set()
@@ -44,8 +46,9 @@ def main() -> None:
 
     rclpy.init()
     node = rclpy.create_node("listener")
-    node.create_subscription(*((PointCloud2, topic, on_batch) if topic.endswith("batch") else
-                               (Imu, topic, on_sample)), QoSProfile(depth=DEPTH))
+    name = topic.rpartition("/")[2]
+    node.create_subscription(KINDS.get(name, Imu), topic,
+                             on_batch if name == "batch" else on_sample, QoSProfile(depth=DEPTH))
     threading.Thread(target=answer, daemon=True).start()
     print("ready", flush=True)
     with contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):

@@ -10,6 +10,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import queue
 import signal
@@ -30,6 +31,7 @@ PATIENCE = 30.0  # s until a process must have said something
 END_TIME = 5.0  # s in which it must end when it is asked to
 QUIET = 0.05  # share of the processor time that others may use, for a figure to be trusted
 STAT = Path("/proc/stat")
+KEPT = 10_000  # lines of complaints
 TICKS = os.sysconf("SC_CLK_TCK")
 
 
@@ -98,6 +100,14 @@ class Process:
             raise self.failure("did not answer")
         return line
 
+    def said(self) -> list[str]:
+        """Return the lines that it printed since the last call."""
+        lines = []
+        with contextlib.suppress(queue.Empty):
+            while (line := self._lines.get_nowait()) is not None:
+                lines.append(line)
+        return lines
+
     def rest(self) -> list[str]:
         """Return what else it printed until it ended."""
         return list(iter(lambda: self._lines.get(timeout=PATIENCE), None))
@@ -109,6 +119,25 @@ class Process:
     def is_running(self) -> bool:
         """Whether it has not ended."""
         return self._process.poll() is None
+
+    @property
+    def number(self) -> int:
+        """Its process number."""
+        return self._process.pid
+
+    def send_signal(self, number: int) -> None:
+        """Send it a signal."""
+        self._process.send_signal(number)
+
+    def wait(self, timeout: float = END_TIME) -> int | None:
+        """Return its exit code once it has ended, None where it goes on."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            return self._process.wait(timeout)
+        return None
+
+    def complaints(self) -> list[str]:
+        """Return the last lines of what it wrote to its standard error."""
+        return list(self._complaints)
 
     def cpu_time(self) -> float:
         """Return the CPU time in s that all of its threads have used so far."""
@@ -129,7 +158,7 @@ class Process:
     def _read_complaints(self) -> None:
         for line in self._process.stderr or ():
             self._complaints.append(line.rstrip("\n"))
-            del self._complaints[:-100]
+            del self._complaints[:-KEPT]
 
 
 def divide_cores() -> int | None:

@@ -147,14 +147,19 @@ def vibration_in_x(times: Array) -> Array:
 
 
 def compare_vibration(messages: Sequence[Any], machine: Machine) -> Comparison:
+    """Compare the accelerations in x of messages with the simulator's vibration."""
+    times = np.array([seconds_of(message) for message in messages])
+    return compare_accelerations(
+        times, np.array([message.linear_acceleration.x for message in messages]), machine)
+
+
+def compare_accelerations(times: Array, measured: Array, machine: Machine) -> Comparison:
     """Compare accelerations in x with the simulator's vibration, but for a delay they share.
 
     The radio and the bus delay all samples alike, which nothing in the data can show; the delay
     is fitted. Where the stamps cannot be that good, because the stream has just begun or the
     machine was late, pieces of the stream may be shifted; their values must fit as well.
     """
-    times = np.array([seconds_of(message) for message in messages])
-    measured = np.array([message.linear_acceleration.x for message in messages])
     late = machine.lateness(times)
     part = slice(0, len(times), max(1, len(times) // 5000))
     delay = best_delay(times[part], measured[part], TIMING)

@@ -42,7 +42,12 @@ class Machine:
     def of_log(cls, path: Path, programs: Sequence[str]) -> Machine:
         """Read what the heartbeat has printed until now."""
         lines = path.read_text().splitlines(keepends=True)
-        notes = [line.split() for line in lines if line.endswith("\n")]
+        return cls.of_lines([line for line in lines if line.endswith("\n")], programs)
+
+    @classmethod
+    def of_lines(cls, lines: Iterable[str], programs: Sequence[str]) -> Machine:
+        """Take lines that the heartbeat has printed."""
+        notes = [line.split() for line in lines]
         return cls(programs, np.array(notes, float).reshape(-1, 2 + len(programs)))
 
     def lateness(self, times: Array) -> Array:
