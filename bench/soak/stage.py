@@ -32,6 +32,7 @@ from sensor_tools.demo.recorder import Channel, Recorder
 
 POLL_TIME = 0.02  # s
 START_TIME = 60.0  # s in which each driver must publish something
+SETTLE_TIME = 5.0  # s that the streams' clocks get in the beginning
 LAST_TIME = 45.0  # s in which all must be OK in the end: some warnings are about the last 30 s
 WINDOW = 5.0  # s whose values are judged together, so much later
 LATE = 1.0  # s that a machine may be late with its notes
@@ -96,6 +97,7 @@ class Stage:
         for lane in self.lanes:
             assert lane.client is not None
             lane.client.meet()
+        self._settle()
         end = time.monotonic() + seconds
         threads = [threading.Thread(target=self._run_lane, args=(lane, word, seed, end))
                    for lane in self.lanes]
@@ -126,6 +128,14 @@ class Stage:
             for lane in self.lanes:
                 if time.monotonic() > end and not lane.watch.received:
                     raise lane.node.failure("published nothing")
+
+    def _settle(self) -> None:
+        """Let the streams settle, on a machine that was busy with starting them."""
+        end = time.monotonic() + SETTLE_TIME
+        while time.monotonic() < end:
+            self._poll()
+        for messages in self._pending.values():
+            messages.clear()
 
     def _await_all_well(self) -> None:
         end = time.monotonic() + LAST_TIME
