@@ -15,6 +15,8 @@ people send it; the third one forces the end.
 
 from __future__ import annotations
 
+import faulthandler
+import gc
 import importlib
 import os
 import signal
@@ -42,8 +44,8 @@ class SignalWatch(threading.Thread):
         signal.set_wakeup_fd(wakeup, warn_on_full_buffer=False)
         for number in signal.SIGINT, signal.SIGTERM:
             signal.signal(number, lambda *_: None)
-        self._stop_devices: Callable[[], None] | None = None
-        self._stop_rest: Callable[[], None] | None = None
+        self._stops: tuple[Callable[[], None], Callable[[], None]] | None = None
+        self._stopper: threading.Thread | None = None
         self.start()
 
     def watch(self, stop_devices: Callable[[], None], stop_rest: Callable[[], None]) -> None:
@@ -53,26 +55,37 @@ class SignalWatch(threading.Thread):
             stop_devices: Leaves the devices stopped and the port closed.
             stop_rest: Has the main thread end.
         """
-        self._stop_rest = stop_rest
-        self._stop_devices = stop_devices
+        self._stops = stop_devices, stop_rest
+
+    def forget(self) -> None:
+        """End at once from now on, as nothing is open any more."""
+        self._stops = None
+        if self._stopper is not None:
+            self._stopper.join(MIDDLEWARE_TIME)
 
     def run(self) -> None:
         """Wait for the signals."""
         os.read(self._signals, 1)
-        if self._stop_devices is None:
-            _end(0)  # nothing was opened yet
-        threading.Thread(target=self._stop, daemon=True).start()
+        if not self._begin_stop():
+            _end(0)
         os.read(self._signals, 1)
         os.read(self._signals, 1)
         _end(1)
 
-    def _stop(self) -> None:
-        assert self._stop_devices is not None
-        assert self._stop_rest is not None
-        end_in(STOP_TIME, 1, "error: the devices could not be stopped in time")
-        self._stop_devices()
-        end_in(MIDDLEWARE_TIME, 0)
-        self._stop_rest()
+    def _begin_stop(self) -> bool:
+        """Begin to stop; return whether anything is open."""
+        if self._stops is None:
+            return False
+        self._stopper = threading.Thread(target=_stop, args=self._stops, daemon=True)
+        self._stopper.start()
+        return True
+
+
+def _stop(stop_devices: Callable[[], None], stop_rest: Callable[[], None]) -> None:
+    end_in(STOP_TIME, 1, "error: the devices could not be stopped in time")
+    stop_devices()
+    end_in(MIDDLEWARE_TIME, 0)
+    stop_rest()
 
 
 def end_in(seconds: float, code: int, message: str = "") -> None:
@@ -96,7 +109,7 @@ watch: SignalWatch | None = None
 def start(module: str) -> None:
     """Run `main` of a module, which can take a second to import, and end the process.
 
-    The middleware's own end can crash where its threads outlive the interpreter, so it is left out.
+    The end of the interpreter is left out: the middleware's threads can outlive it and crash.
     """
     global watch
     watch = SignalWatch()
@@ -105,6 +118,19 @@ def start(module: str) -> None:
         importlib.import_module(module).main()
     except SystemExit as end:
         code = end.code or 0
+    watch.forget()
+    _release()
     if isinstance(code, int):
         _end(code)
     _end(1, str(code))
+
+
+def _release() -> None:
+    """Have the middleware take away its shared memory: nobody holds the node any more.
+
+    Where it hangs it lets no thread of Python run, so faulthandler's ends the process.
+    """
+    with open(os.devnull, "w") as nowhere:
+        faulthandler.dump_traceback_later(MIDDLEWARE_TIME, exit=True, file=nowhere)
+        gc.collect()
+        faulthandler.cancel_dump_traceback_later()

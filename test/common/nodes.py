@@ -8,7 +8,7 @@
 
 """Nodes as processes of their own, and a ROS node in the test that talks to them.
 
-    with Ros() as ros, NodeProcess("isys_radar_driver.node", {"serial_port": port}) as process:
+    with Ros() as ros, NodeProcess("isys_radar_driver.program", {"serial_port": port}) as process:
         radar = ros.remote("/isys_radar")
         points = radar.subscribe(PointCloud2, "points")
         ros.wait_until(lambda: points)

@@ -22,7 +22,7 @@ from nodes import DEADLINE, NodeProcess, Process
 
 HERE = f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})"
 ISYS, ICOTRONIC, UC4000 = (
-    f"{family}_driver.node" for family in ("isys_radar", "icotronic", "uc4000"))
+    f"{family}_driver.program" for family in ("isys_radar", "icotronic", "uc4000"))
 NETWORK = "10.77.0"
 
 

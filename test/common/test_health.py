@@ -36,8 +36,8 @@ NODES = {
                 "a.address": 1, "b.address": 2, "config_mode": "check", "a.gain_db": 60.0}],
 }
 PIECES = re.compile(rf"{GAP}|,|(?=instead of)")  # where a message is put together
-MODULES = {"isys_radar": "isys_radar_driver.node", "icotronic": "icotronic_driver.node",
-           "uc4000": "uc4000_driver.node"}
+PACKAGES = {"isys_radar": "isys_radar_driver", "icotronic": "icotronic_driver",
+            "uc4000": "uc4000_driver"}
 
 
 @pytest.fixture
@@ -60,8 +60,8 @@ def start(name, link, directory):
     """Yield the nodes of a driver, which write recordings into a directory."""
     for number, parameters in enumerate(NODES[name]):
         given = json.loads(json.dumps(parameters).replace("{line}", link))
-        yield NodeProcess(MODULES[name], {**given, "recording_directory": str(directory)},
-                          "-r", f"__node:={name}_{number}")
+        given["recording_directory"] = str(directory)
+        yield NodeProcess(f"{PACKAGES[name]}.program", given, "-r", f"__node:={name}_{number}")
 
 
 @pytest.mark.parametrize("name", NODES)
@@ -93,7 +93,7 @@ def test_every_key_is_explained_and_every_explained_key_is_there(name, ros, line
 
 @pytest.mark.parametrize("name", HEALTH)
 def test_every_explained_message_is_one_of_the_code(name):
-    folder = ROOT / MODULES[name].partition(".")[0]
+    folder = ROOT / PACKAGES[name]
     code = "\n".join(
         path.read_text() for path in (*folder.glob("*.py"), *(ROOT / "driver_common").glob("*.py"))
         if path.name != "health.py")
@@ -119,7 +119,7 @@ def said(path):
 
 @pytest.mark.parametrize("name", HEALTH)
 def test_every_level_is_that_of_the_code(name):
-    files = ROOT / MODULES[name].replace(".", "/"), ROOT / "driver_common" / "device_node"
+    files = ROOT / PACKAGES[name] / "node", ROOT / "driver_common" / "device_node"
     pairs = [pair for file in files for pair in said(file.with_suffix(".py"))]
     assert len(pairs) >= 4
     for level, text in pairs:

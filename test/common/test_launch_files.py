@@ -72,7 +72,7 @@ def test_a_lifecycle_manager(name):
 def test_what_the_lifecycle_manager_asks_for_activates_a_node():
     context = launch_stand_in.launch(include("lifecycle"), driver="uc4000", port="sim://UC4000")
     ((_, name, _, _, parameters),) = context.nodes
-    with Ros() as ros, NodeProcess("uc4000_driver.node", parameters) as process:
+    with Ros() as ros, NodeProcess("uc4000_driver.program", parameters) as process:
         remote = ros.remote(f"/{name}")
         events = remote.subscribe(TransitionEvent, "transition_event")
         ros.wait_until(lambda: remote.state() == "unconfigured")

@@ -109,7 +109,7 @@ def test_a_running_node_has_a_status_that_its_analyzer_takes(analyzers, node, pa
         level, levels = analyzer.report(PERIOD)
         return level == OK and levels
 
-    with Ros() as ros, NodeProcess(f"{node}_driver.node", parameters,
+    with Ros() as ros, NodeProcess(f"{node}_driver.program", parameters,
                                    "-r", "__ns:=/car") as process:
         arrays = ros.subscribe(DiagnosticArray, "/diagnostics")
         assert ros.wait_until(healthy) == {f"car {node}: {sensor}": OK}
@@ -181,7 +181,7 @@ def test_nan_breaks_the_range_layer_and_nothing_else_that_can_be_set():
 def test_the_message_of_a_running_node_clears_with_the_example():
     layer = example("nav2_range_layer", "/local_costmap/local_costmap")["range_layer"]
     with Ros() as ros, NodeProcess(
-            "uc4000_driver.node", {"serial_port": "sim://UC4000"},
+            "uc4000_driver.program", {"serial_port": "sim://UC4000"},
             "--params-file", str(EXAMPLES / "nav2_range_layer.yaml")) as process:
         messages = ros.subscribe(Range, "/uc4000/range")
         ros.wait_until(lambda: len(messages) >= 5)
@@ -269,7 +269,7 @@ def test_an_unknown_variance_would_be_taken_for_nearly_perfect():
 @pytest.mark.parametrize("name", ["tilt", "robot_localization"])
 def test_a_running_node_takes_the_example(name):
     with Ros() as ros, NodeProcess(
-            "icotronic_driver.node", {"can_interface": "sim"},
+            "icotronic_driver.program", {"can_interface": "sim"},
             "--params-file", str(EXAMPLES / f"{name}.yaml")) as process:
         messages = ros.subscribe(Imu, "/icotronic/imu/data_raw")
         ros.wait_until(lambda: len(messages) >= 5)

@@ -44,11 +44,12 @@ class Driver(NamedTuple):
 
 
 DRIVERS = [
-    Driver("isys_radar_driver.node", "isys_radar", {"serial_port": "sim://iSYS-4001"}, "points",
-           PointCloud2, SERIAL),
-    Driver("uc4000_driver.node", "uc4000", {"serial_port": "sim://UC4000"}, "range", Range, SERIAL),
-    Driver("icotronic_driver.node", "icotronic", {"can_interface": "sim"}, "imu/batch", PointCloud2,
-           CAN),
+    Driver("isys_radar_driver.program", "isys_radar", {"serial_port": "sim://iSYS-4001"},
+           "points", PointCloud2, SERIAL),
+    Driver("uc4000_driver.program", "uc4000", {"serial_port": "sim://UC4000"},
+           "range", Range, SERIAL),
+    Driver("icotronic_driver.program", "icotronic", {"can_interface": "sim"},
+           "imu/batch", PointCloud2, CAN),
 ]
 
 
@@ -103,7 +104,7 @@ def test_the_last_minute_is_saved_on_request(ros, home, driver):
 
 
 def test_nothing_is_saved_before_there_is_anything(ros, home):
-    with NodeProcess("uc4000_driver.node", {"autostart": False, "serial_port": "sim://UC4000"}):
+    with NodeProcess("uc4000_driver.program", {"autostart": False, "serial_port": "sim://UC4000"}):
         node = ros.remote("/uc4000")
         assert node.state() == "unconfigured"
     assert not home.exists()
@@ -112,7 +113,7 @@ def test_nothing_is_saved_before_there_is_anything(ros, home):
 def test_the_first_error_of_an_outage_is_a_recording(ros, tmp_path):
     line, _ = simulated_line([7])
     line.start()
-    with NodeProcess("uc4000_driver.node", {
+    with NodeProcess("uc4000_driver.program", {
             "serial_port": line.port, "recording_directory": str(tmp_path / "outages")}) as process:
         ranges = ros.remote("/uc4000").subscribe(Range, "range")
         ros.wait_until(lambda: ranges)
@@ -131,7 +132,7 @@ def test_the_first_error_of_an_outage_is_a_recording(ros, tmp_path):
 def test_an_outage_without_a_directory_is_no_recording(ros, home):
     line, _ = simulated_line([7])
     line.start()
-    with NodeProcess("uc4000_driver.node", {"serial_port": line.port}) as process:
+    with NodeProcess("uc4000_driver.program", {"serial_port": line.port}) as process:
         ranges = ros.remote("/uc4000").subscribe(Range, "range")
         ros.wait_until(lambda: ranges)
         line.faults.silent = True
@@ -142,7 +143,7 @@ def test_an_outage_without_a_directory_is_no_recording(ros, home):
 
 
 def test_all_is_recorded_until_the_end(ros, tmp_path):
-    with NodeProcess("uc4000_driver.node", {
+    with NodeProcess("uc4000_driver.program", {
             "serial_port": "sim://UC4000", "record_raw": True,
             "recording_directory": str(tmp_path)}) as process:
         ranges = ros.remote("/uc4000").subscribe(Range, "range")
@@ -158,7 +159,7 @@ def test_all_is_recorded_until_the_end(ros, tmp_path):
 
 def test_a_directory_that_cannot_be_written_is_told_once(ros, tmp_path):
     (tmp_path / "file").write_text("")
-    with NodeProcess("uc4000_driver.node", {
+    with NodeProcess("uc4000_driver.program", {
             "serial_port": "sim://UC4000", "record_raw": True,
             "recording_directory": str(tmp_path / "file")}) as process:
         node = ros.remote("/uc4000")

@@ -189,8 +189,8 @@ def test_commands_of_the_vendors_tool_are_those_that_it_has():
 
 @pytest.mark.parametrize(("family", "arguments", "module", "sensors"), [
     ("isys", ("--model", "iSYS-4001,iSYS-4001", "--address", "128,129"),
-     "isys_radar_driver.node", ("front", "rear")),
-    ("uc4000", ("--addresses", "1,2,3,4,5"), "uc4000_driver.node",
+     "isys_radar_driver.program", ("front", "rear")),
+    ("uc4000", ("--addresses", "1,2,3,4,5"), "uc4000_driver.program",
      ("left", "right", "front", "rear", "tank"))])
 def test_the_shipped_file_of_a_wire_finds_its_sensors(family, arguments, module, sensors, tmp_path):
     """The command line of the page, but for the program that starts the node."""

@@ -33,8 +33,8 @@ from isys_radar_driver.settings import settings_of
 from uc4000_driver.node import Uc4000Node
 from uc4000_driver.settings import ALL_SETTINGS as UC4000_SETTINGS
 
-NODES = {IsysRadarNode: "isys_radar_driver.node", IcotronicNode: "icotronic_driver.node",
-         Uc4000Node: "uc4000_driver.node"}
+NODES = {IsysRadarNode: "isys_radar_driver.program", IcotronicNode: "icotronic_driver.program",
+         Uc4000Node: "uc4000_driver.program"}
 ROWS = {
     **{f"the options of {node.__name__}":
        {option.name: option for option in (*node.bus_options(), *node.SENSOR_OPTIONS)}
@@ -144,7 +144,7 @@ def test_a_node_takes_its_own_dump(node, parameters, tmp_path):
 
 
 def test_lists_that_were_empty_can_be_set():
-    with Ros() as ros, NodeProcess("icotronic_driver.node", {"autostart": False}) as process:
+    with Ros() as ros, NodeProcess("icotronic_driver.program", {"autostart": False}) as process:
         remote = ros.remote("/icotronic")
         assert remote.set("can_options", ["host=127.0.0.1", "port=1"]).successful
         assert remote.get("can_options") == ["host=127.0.0.1", "port=1"]

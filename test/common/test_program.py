@@ -9,6 +9,7 @@
 """How a node ends: well, whatever it does when a signal comes, and in bounded time."""
 
 import os
+import re
 import signal
 from pathlib import Path
 
@@ -101,3 +102,16 @@ def test_a_middleware_that_hangs_does_not_keep_the_process():
         process.wait_for_line("connected to")
         os.kill(process.number, signal.SIGINT)
         assert end_of(process) == 0
+
+
+def test_a_node_leaves_no_shared_memory_of_the_middleware():
+    arguments = "--ros-args", "-p", "serial_port:=sim://iSYS-4001"
+    with Process("isys_radar_driver.program", *arguments) as process:
+        process.wait_for_line("connected to")
+        mapped = set(re.findall(r"/dev/shm/fastrtps_[0-9a-f]{16}$",
+                                Path(f"/proc/{process.number}/maps").read_text(), re.MULTILINE))
+        if not mapped:
+            pytest.skip("another middleware")
+        os.kill(process.number, signal.SIGINT)
+        assert end_of(process) == 0
+    assert [name for name in mapped if Path(name).exists()] == []

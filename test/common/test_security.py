@@ -18,9 +18,9 @@ from nodes import NodeProcess, Ros
 
 LISTEN = "0A"  # state of a TCP socket in /proc/net/tcp
 NODES = {
-    "isys_radar": ("isys_radar_driver.node", {"serial_port": "loop://"}),
-    "icotronic": ("icotronic_driver.node", {"can_interface": "virtual"}),
-    "uc4000": ("uc4000_driver.node", {"serial_port": "loop://"}),
+    "isys_radar": ("isys_radar_driver.program", {"serial_port": "loop://"}),
+    "icotronic": ("icotronic_driver.program", {"can_interface": "virtual"}),
+    "uc4000": ("uc4000_driver.program", {"serial_port": "loop://"}),
 }
 
 

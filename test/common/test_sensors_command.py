@@ -38,7 +38,7 @@ from sensor_tools.search.place import CanPlace, SerialPlace
 from sensor_tools.search.result import Found
 from uc4000_driver.commands import PROFILES
 
-MODULE = "isys_radar_driver.node"
+MODULE = "isys_radar_driver.program"
 ROOT = Path(__file__).resolve().parent.parent.parent
 RADAR = ("--family", "isys", "--baud", 115200)
 

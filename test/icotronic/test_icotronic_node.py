@@ -43,7 +43,7 @@ from sensor_tools import convert_imu
 from sensor_tools.bags import NEEDED, Record, has_library, read_bag, write_bag
 
 DEADLINE = 60.0  # s; far more than anything takes, also on a busy machine
-MODULE, NAME, STATUS = "icotronic_driver.node", "/icotronic", "icotronic: sensor"
+MODULE, NAME, STATUS = "icotronic_driver.program", "/icotronic", "icotronic: sensor"
 SLOW = "/slow"  # name of the node that runs through many tests
 RATE = 38.4e6 / (3 * 21 * 64)  # values/s after a reset
 OK, WARN, ERROR, STALE = range(4)

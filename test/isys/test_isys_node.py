@@ -34,7 +34,7 @@ from isys_radar_driver.radar import Identity, Options, Radar
 from isys_radar_driver.session import RadarBus
 from isys_radar_driver.targets import Target
 
-MODULE = "isys_radar_driver.node"
+MODULE = "isys_radar_driver.program"
 NAME = "/isys_radar"
 FIELDS = ("x", "y", "z", "intensity", "range", "azimuth", "elevation", "radial_velocity")
 TARGET = Target(signal=42.5, velocity=3.0, range=10.0, angle=math.radians(30.0))

@@ -28,7 +28,7 @@ from uc4000_driver.commands import OpCode
 from uc4000_driver.simulator.line import simulated_line
 from uc4000_driver.telegram import ErrorCode, Reply
 
-UC4000 = "uc4000_driver.node"
+UC4000 = "uc4000_driver.program"
 DISTANCES = {"left": 1.6, "right": 2.4}
 OK, WARN, ERROR = (ord(level) for level in (
     DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR))
@@ -514,7 +514,8 @@ def test_an_end_within_a_long_measurement(tmp_path):
 
 
 def test_an_error_in_the_code_of_the_diagnostics_does_not_end_the_node(ros):
-    before = f"import {UC4000} as node; node.Uc4000Node.status_of = lambda self, sensor: 1 / 0"
+    before = ("from uc4000_driver.node import Uc4000Node\n"
+              "Uc4000Node.status_of = lambda self, sensor: 1 / 0")
     arguments = "--ros-args", "-p", "serial_port:=sim://UC4000", "-r", "__node:=tank"
     with Process(UC4000, *arguments, before=before):
         status = ros.wait_for_status("tank: sensor", lambda status: "report it" in status.message)
