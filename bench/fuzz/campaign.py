@@ -63,7 +63,7 @@ def fault_of(target: Target, data: bytes, choices: int) -> str:
     try:
         with _limited():
             target.check(data, Random(choices))
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         place = traceback.extract_tb(error.__traceback__)[-1]
         return f"{type(error).__name__} in {Path(place.filename).name}, {place.name}: {place.line}"
     return ""

@@ -14,6 +14,7 @@ Whatever is set, the services answer; a refusal has a reason in words, and chang
 from __future__ import annotations
 
 import os
+import struct
 import tempfile
 import time
 from collections.abc import Callable, Sequence
@@ -21,7 +22,6 @@ from functools import cache
 from random import Random
 from typing import Any
 
-from bench.fuzz.settings import values_of
 from bench.fuzz.target import Target
 from sensor_tools.ros_domain import claim_domain
 
@@ -100,14 +100,15 @@ def _message(name: str, data: bytes, random: Random) -> Any:
     """Return a parameter whose value, or at least its type, is what an input says."""
     from rcl_interfaces.msg import Parameter, ParameterValue
 
-    number, _, real, fraction, *_ = values_of(data)
+    number = int.from_bytes(data[:8], "little", signed=True)
+    (real,) = struct.unpack("<d", data[:8].ljust(8, b"\0"))
     text = data.decode("utf-8", "replace").replace("\0", "")
     value = ParameterValue(
         type=random.choice((random.randrange(TYPES), random.randrange(256))),
-        bool_value=bool(data), double_value=random.choice((real, fraction)),
-        integer_value=random.choice((int(str(number)) % 2 ** 63, len(data), -1)),
+        bool_value=bool(data), double_value=random.choice((real, number % 512 / 8)),
+        integer_value=random.choice((number, len(data), -1)),
         string_value=text, byte_array_value=[data[:1] or b"\0"], bool_array_value=[True],
-        integer_array_value=[1, 2], double_array_value=[real, fraction][:len(data) % 3],
+        integer_array_value=[1, 2], double_array_value=[real, 0.5][:len(data) % 3],
         string_array_value=[text, "front"])
     return Parameter(name=name, value=value)
 

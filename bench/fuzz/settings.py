@@ -39,7 +39,7 @@ def _rows() -> list[Any]:
                                            for variant in driver.variants(name).values()))]
 
 
-def values_of(data: bytes) -> list[object]:
+def _values(data: bytes) -> list[object]:
     """Return what an input can mean as the value of a parameter."""
     number = int.from_bytes(data[:9], "little", signed=True)
     real = struct.unpack("<d", data[:8].ljust(8, b"\0"))[0]
@@ -50,7 +50,7 @@ def values_of(data: bytes) -> list[object]:
 
 def _check_rows(data: bytes, random: Random) -> None:
     row = random.choice(_rows())
-    for value in values_of(data):
+    for value in _values(data):
         with contextlib.suppress(SettingError):
             checked = row.check(value)
             assert row.check(checked) == checked, (row.name, value)
