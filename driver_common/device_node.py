@@ -29,6 +29,7 @@ from std_srvs.srv import Trigger
 from driver_common import diagnostics, node_recorder, program
 from driver_common.device_thread import Bus, DeviceThread
 from driver_common.errors import DriverError, SettingError
+from driver_common.middleware import let_events_wait
 from driver_common.node_recorder import NodeRecorder
 from driver_common.parameter_node import ParameterNode
 from driver_common.recording import SERIAL
@@ -432,6 +433,7 @@ def run(make_node: Callable[[], DeviceNode], args: Sequence[str] | None = None) 
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = make_node()
+        let_events_wait()
         watch.watch(node.stop, rclpy.try_shutdown)
         code = _work(node)
     except DriverError as error:
