@@ -393,3 +393,34 @@ def test_noise_without_an_end_fills_no_memory_where_no_raw_signals_may_come(nois
     for _ in range(2000):
         assert not list(parser.feed(bytes.fromhex(noise)))
         assert parser.pending <= 500
+
+
+class Counting(bytearray):
+    """Bytes which count how many of them are looked at."""
+
+    looks = 0
+
+    def __getitem__(self, key):  # type: ignore[no-untyped-def]
+        found = super().__getitem__(key)
+        Counting.looks += len(found) if isinstance(key, slice) else 1
+        return found
+
+
+@pytest.mark.parametrize("noise", [
+    "A2 01 80 E0 08 FF 04", "A2 01 80 E0 01 01 02", "A2 01 80 DA 01 23", "A2 01 80 DA 01 01",
+    "A2 01 80 DA 01 FF", "68 FF FF 68", "68 03 03 68", "10", "16"])
+@pytest.mark.parametrize("piece", [1, 4096])
+@pytest.mark.parametrize("fixed_targets", [None, 0, 35])
+def test_no_byte_costs_more_than_a_look_at_every_length(
+        noise: str, piece: int, fixed_targets: int | None, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Counting, "looks", 0)
+    parser = FrameParser(fixed_targets)
+    parser._buffer, parser._sums = Counting(), Counting(1)
+    stream = bytes.fromhex(noise) * (6_000 // len(bytes.fromhex(noise)))
+    if piece > 1:
+        stream = bytes.fromhex(noise).ljust(7, b"\0") * (LARGEST // 7 + 3000)
+    for start in range(0, len(stream), piece):
+        assert not list(parser.feed(stream[start:start + piece]))
+        assert parser.pending < LARGEST
+    assert not list(parser.flush())
+    assert Counting.looks <= 4 * 35 * len(stream) + LARGEST
