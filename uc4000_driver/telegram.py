@@ -139,6 +139,9 @@ class ReplyParser:
     to begin right behind a gap; nothing is searched for in noise. A long one may have bytes in
     front of it that are older.
 
+    Bounds: at most 64 bytes wait, what comes beyond them is dropped, and a feed looks at each
+    possible beginning of a reply once, so it costs the same however much came before.
+
     Attributes:
         replies: The replies found so far.
         times: When each was complete, as `feed` was told.

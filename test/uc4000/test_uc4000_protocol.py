@@ -364,3 +364,30 @@ def test_noise_without_end_is_not_kept(length: int) -> None:
     parser.gap()
     parser.feed(VERSION if length == 19 else bytes.fromhex("23 D1"))
     assert parser.complete
+
+
+class Counting(bytearray):
+    """Bytes which count how many of them are looked at."""
+
+    looks = 0
+
+    def __getitem__(self, key):  # type: ignore[no-untyped-def]
+        found = super().__getitem__(key)
+        Counting.looks += len(found) if isinstance(key, slice) else 1
+        return found
+
+
+@pytest.mark.parametrize("length", [2, 3, 12, 34])
+@pytest.mark.parametrize("noise", ["00", "A0", "FF", "55 AA", "80 3F"])
+def test_noise_without_an_end_costs_the_same_per_byte_and_fills_no_memory(
+        length: int, noise: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Counting, "looks", 0)
+    parser = ReplyParser(length)
+    parser._buffer = Counting()
+    parser.sent(CAST_REQUEST)
+    count = 1000
+    for byte in bytes.fromhex(noise) * count:
+        parser.feed(bytes((byte,)))
+        assert len(parser.pending) <= 64
+    assert Counting.looks <= 64 * 34 * count * len(bytes.fromhex(noise))
+    assert len(parser.replies) <= 1
