@@ -152,6 +152,9 @@ class RecordingText:
 def read_recording(path: Path, *, head: bool = False) -> Recording:
     """Return what is in a file.
 
+    Bounds: a file of more than `MAX_FILE` is refused, each line is looked at once, and all entries
+    are held; the reader stops at the first line that is damaged.
+
     Args:
         path: The file.
         head: Whether to read no entries, which takes time.

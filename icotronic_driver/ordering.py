@@ -33,6 +33,8 @@ class Frame(NamedTuple):
 class FrameOrder:
     """Puts the frames of a stream in order.
 
+    Bounds: less than `MOST_HELD` frames are held, and a frame is compared with those alone.
+
     Attributes:
         expected: Counter of a frame that needs no `sort`: who has such a one only counts on.
     """

@@ -225,6 +225,8 @@ class StreamDecoder:
     `n * data_sets + j` sample intervals after the first one, whatever was lost in between. The
     counter hides whole turns (80 ms at the sensor's usual pace); the time tells of those.
 
+    Bounds: one payload is held, and a frame costs the same however much is missing before it.
+
     Attributes:
         format: Format of the stream.
         statistics: What was counted.

@@ -14,6 +14,7 @@ import io
 
 import can
 import pytest
+from operations import calls
 
 from driver_common import flight_recorder
 from driver_common.errors import SettingError
@@ -320,3 +321,9 @@ def test_a_recording_that_was_cut_can_be_ended_by_hand(read):
 def test_a_file_that_cannot_be_read_is_one_clear_error(tmp_path, name):
     with pytest.raises(SettingError, match=r"^cannot replay .*: (No such file|Is a directory)"):
         read_recording(tmp_path / name)
+
+
+@pytest.mark.parametrize(("link", "entries"), [(SERIAL, SERIAL_ENTRIES), (CAN, CAN_ENTRIES)])
+def test_reading_a_recording_costs_as_much_as_it_is_long(read, link, entries):
+    short, long = (text_of(link, entries * count) for count in (20, 80))
+    assert calls(lambda: read(long)) <= 4.5 * calls(lambda: read(short))

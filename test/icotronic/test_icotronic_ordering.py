@@ -9,8 +9,9 @@
 """Frames in the order of their counters."""
 
 import pytest
+from operations import calls
 
-from icotronic_driver.ordering import Frame, FrameOrder
+from icotronic_driver.ordering import MOST_HELD, Frame, FrameOrder
 from icotronic_driver.streaming import StreamDecoder, StreamFormat
 
 FRAME_TIME = 315_000  # ns
@@ -111,3 +112,20 @@ def test_a_frame_that_was_overtaken_keeps_the_later_arrival_of_both():
     order.sort(frame(0))
     assert order.sort(frame(2, seen=10)) == []
     assert [one.seen for one in order.sort(frame(1, seen=20))] == [20, 20]
+
+
+@pytest.mark.parametrize("counters", [
+    [0], [0, 2], [0, 2, 4, 8, 16, 32], [9, 7, 5, 3, 1], [0, 255], [0, 128], [3, 1, 2, 0, 90]])
+def test_a_frame_costs_the_same_whatever_came_before(counters):
+    short, long = ([frame(counter, place) for place, counter in enumerate(counters * count)]
+                   for count in (200, 800))
+    assert calls(lambda: play(long)) <= 4.5 * calls(lambda: play(short))
+
+
+@pytest.mark.parametrize("counters", [
+    [0], [0, 2], [0, 2, 4, 8, 16, 32], [9, 7, 5, 3, 1], [0, 255], [0, 128], [3, 1, 2, 0, 90]])
+def test_few_frames_are_held_whatever_comes(counters):
+    order = FrameOrder(StreamDecoder(StreamFormat((True, False, False), 3), 3175.0))
+    for place, counter in enumerate(counters * 50):
+        order.sort(frame(counter, place))
+        assert len(order._held) < MOST_HELD
