@@ -24,6 +24,7 @@ from driver_common.errors import (
     NoAnswerError,
     RefusedError,
     SettingError,
+    StepInterruptedError,
 )
 
 DeviceT = TypeVar("DeviceT", bound=Device)
@@ -144,6 +145,11 @@ class DeviceBus(Generic[DeviceT]):
                 self._attend(device)
             else:
                 self._find(device)
+        except StepInterruptedError:
+            device.due = 0.0
+            if not connected:
+                device.forget()  # nobody knows how far it came
+            raise
         except LinkError:
             raise
         except DriverError as error:
@@ -204,6 +210,8 @@ class DeviceBus(Generic[DeviceT]):
     def _link_errors_noted(self) -> Iterator[None]:
         try:
             yield
+        except StepInterruptedError:
+            raise
         except LinkError as error:
             self.link_error = error
             raise

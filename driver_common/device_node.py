@@ -35,6 +35,8 @@ from driver_common.parameter_node import ParameterNode
 from driver_common.recording import SERIAL
 from driver_common.settings import Option
 
+STOP_TIME = 2.0  # s for which a user waits until devices are stopped
+
 CONFIG_MODES = {"push": 0, "check": 1, "leave": 2}
 
 FRAME_ID = Option(
@@ -132,9 +134,20 @@ class DeviceNode(ParameterNode):
 
     def call(self, job: Callable[[], Any]) -> Any:
         """Run a job in the thread of the bus; raises DriverError."""
+        return self._running_thread.call(job)
+
+    def stop_devices(self, job: Callable[[], Any]) -> None:
+        """Have a job stop devices, whatever the bus is doing; raises DriverError.
+
+        The bus goes on with it where it takes longer than anybody wants to wait.
+        """
+        self._running_thread.call(job, STOP_TIME, interrupt=True)
+
+    @property
+    def _running_thread(self) -> DeviceThread:
         if self.thread is None:
             raise DriverError(self._unconfigured())
-        return self.thread.call(job)
+        return self.thread
 
     def unreachable(self) -> str:
         """Return why no device can be reached, "" where one may be."""
@@ -151,7 +164,8 @@ class DeviceNode(ParameterNode):
         return next(device for device in self.bus.devices if device.options.name == sensor)
 
     def _enable(self, sensor: str, enabled: bool) -> str:
-        self.call(lambda: self.bus.set_enabled(self.device(sensor), enabled))
+        call = self.call if enabled else self.stop_devices
+        call(lambda: self.bus.set_enabled(self.device(sensor), enabled))
         return f"acquisition {'started' if enabled else 'stopped'}"
 
     def give_address(self, sensor: str, give: Callable[[int], object]) -> str:
@@ -371,9 +385,10 @@ class DeviceNode(ParameterNode):
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Stop the devices."""
         try:
-            self.call(lambda: self.bus.set_active(False))
+            self.bus.active = False  # for what comes next, also where that takes too long
+            self.stop_devices(lambda: self.bus.set_active(False))
         except DriverError as error:
-            self.get_logger().warning(str(error))
+            self.get_logger().warning(f"some may measure until they are told again: {error}")
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:

@@ -10,16 +10,17 @@
 
 from __future__ import annotations
 
+import itertools
 import queue
 import threading
 import traceback
 from collections.abc import Callable
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
-from typing import Any, Protocol, TypeVar, runtime_checkable
+from typing import Any, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 from driver_common import clocks as time
-from driver_common.errors import DriverError, NoAnswerError
+from driver_common.errors import DriverError, NoAnswerError, StepInterruptedError
 
 T = TypeVar("T")
 
@@ -70,7 +71,13 @@ class Interruptible(Protocol):
     """A bus whose steps can take long."""
 
     def interrupt(self) -> None:
-        """Have the present step end soon with a DriverError; called from another thread."""
+        """Have the present step end soon with a StepInterruptedError; called from another thread.
+
+        So does all that is asked of the devices until `resume`.
+        """
+
+    def resume(self) -> None:
+        """Ask the devices again."""
 
 
 @runtime_checkable
@@ -79,6 +86,22 @@ class Patient(Protocol):
 
     def while_waiting(self, task: Callable[[], None]) -> None:
         """Have `task` done now and then within a long step; it cannot have the link."""
+
+
+class _Job(NamedTuple):
+    """What is to be done in the thread; the first of them sorts before all others.
+
+    Attributes:
+        order: 0 = at once, 1 = in its turn.
+        number: Its turn.
+        run: What to do.
+        future: Takes the result.
+    """
+
+    order: int
+    number: int
+    run: Callable[[], Any]
+    future: Future[Any]
 
 
 class DeviceThread(threading.Thread):
@@ -102,22 +125,28 @@ class DeviceThread(threading.Thread):
         self._bus = bus
         self._on_state = on_state
         self._on_step = on_step
-        self._jobs: queue.SimpleQueue[tuple[Callable[[], Any], Future[Any]] | None] = (
-            queue.SimpleQueue())
+        self._jobs: queue.PriorityQueue[_Job] = queue.PriorityQueue()
+        self._numbers = itertools.count()
         self._stopping = False
         self._may_interrupt = True  # not while it takes leave of the devices
         self._interrupting = threading.Lock()
         if isinstance(bus, Patient):
             bus.while_waiting(self._run_between)
 
-    def call(self, job: Callable[[], T], timeout: float = CALL_TIMEOUT) -> T:
-        """Run `job` in the thread of the bus and return its result, or raise what it raises."""
+    def call(self, job: Callable[[], T], timeout: float = CALL_TIMEOUT, *,
+             interrupt: bool = False) -> T:
+        """Run `job` in the thread of the bus and return its result, or raise what it raises.
+
+        Args:
+            job: What to do.
+            timeout: Time in s after which it is not waited for any more.
+            interrupt: Whether what is being done now ends for it, where the bus can do that.
+        """
         if threading.current_thread() is self:
             return job()
         if self._stopping or not self.is_alive():
             raise NoAnswerError("the link is closed")
-        future: Future[T] = Future()
-        self._jobs.put((job, future))
+        future = self._put(job, at_once=interrupt)
         try:
             return future.result(timeout)
         except FutureTimeoutError:
@@ -127,15 +156,12 @@ class DeviceThread(threading.Thread):
 
     def post(self, job: Callable[[], Any]) -> None:
         """Have `job` run in the thread of the bus, without waiting for it."""
-        self._jobs.put((job, Future()))
+        self._put(job)
 
     def stop(self) -> None:
         """Close the bus, end the thread and wait for it."""
         self._stopping = True
-        self._jobs.put(None)
-        with self._interrupting:
-            if self._may_interrupt and isinstance(self._bus, Interruptible):
-                self._bus.interrupt()
+        self._put(lambda: None, at_once=True)
         if self.is_alive():
             self.join()
 
@@ -144,10 +170,11 @@ class DeviceThread(threading.Thread):
         backoff = Backoff()
         while not self._stopping:
             try:
+                self._resume()  # an interruption may have come too late
                 self._bus.open()
                 works = False  # some links fail only when they are used
                 while not self._stopping:
-                    pause = min(self._bus.poll(), LONGEST_PAUSE)
+                    pause = self._step()
                     if not works:
                         works = True
                         backoff.reset()
@@ -168,6 +195,29 @@ class DeviceThread(threading.Thread):
                 self._run_jobs(backoff.pause())
         self._run_jobs(0)
 
+    def _step(self) -> float:
+        """Do one step; return the time in s until the next one, 0 where it was interrupted."""
+        try:
+            return min(self._bus.poll(), LONGEST_PAUSE)
+        except StepInterruptedError:
+            if self._stopping:
+                raise
+            self._resume()  # what it was interrupted for may be done already
+            return 0.0
+
+    def _put(self, job: Callable[[], T], *, at_once: bool = False) -> Future[T]:
+        """Have a job run in this thread, before all others and what is being done now or not."""
+        future: Future[T] = Future()
+        self._jobs.put(_Job(0 if at_once else 1, next(self._numbers), job, future))
+        with self._interrupting:
+            if at_once and self._may_interrupt and isinstance(self._bus, Interruptible):
+                self._bus.interrupt()
+        return future
+
+    def _resume(self) -> None:
+        if not self._stopping and isinstance(self._bus, Interruptible):
+            self._bus.resume()
+
     def _run_between(self) -> None:
         """Run waiting jobs within a long step."""
         self._on_step(0.0)
@@ -177,21 +227,22 @@ class DeviceThread(threading.Thread):
         """Run waiting jobs; with none waiting, wait up to `pause` s for the first one."""
         try:
             pause = time.waited(pause) if pause > 0 else 0.0
-            item = self._jobs.get(timeout=pause) if pause > 0 else self._jobs.get_nowait()
-            while item is not None:
-                self._run_job(*item)
-                item = self._jobs.get_nowait()
+            job = self._jobs.get(timeout=pause) if pause > 0 else self._jobs.get_nowait()
+            while True:
+                self._run_job(job)
+                job = self._jobs.get_nowait()
         except queue.Empty:
             pass
 
-    @staticmethod
-    def _run_job(job: Callable[[], Any], future: Future[Any]) -> None:
-        if not future.set_running_or_notify_cancel():
+    def _run_job(self, job: _Job) -> None:
+        if not job.future.set_running_or_notify_cancel():
             return
+        if job.order == 0:
+            self._resume()
         try:
-            future.set_result(job())
+            job.future.set_result(job.run())
         except Exception as error:  # belongs to the caller
-            future.set_exception(error)
+            job.future.set_exception(error)
 
 
 def _internal(error: Exception) -> DriverError:

@@ -13,12 +13,19 @@ so that a node can log it as it is.
 """
 
 
+STEP_INTERRUPTED = "interrupted, as the driver is to stop; try again"
+
+
 class DriverError(Exception):
     """Base of all errors that a driver raises on purpose."""
 
 
 class LinkError(DriverError):
     """The link itself failed: no such port, no permission, in use, unplugged, server gone."""
+
+
+class StepInterruptedError(LinkError):
+    """A step of the bus ended early, because a user wants something that cannot wait."""
 
 
 class NoAnswerError(DriverError):

@@ -26,7 +26,7 @@ import serial
 from serial.tools import list_ports
 
 from driver_common.advice import SERIAL_ERRORS
-from driver_common.errors import LinkError
+from driver_common.errors import STEP_INTERRUPTED, LinkError, StepInterruptedError
 from driver_common.flight_recorder import FlightRecorder, Kind
 from driver_common.port_use import group_of, holders_text
 
@@ -145,15 +145,15 @@ class SerialLink:
         return data
 
     def interrupt(self) -> None:
-        """Have every read end with a LinkError until `resume`; called from another thread."""
+        """Have reads end with a StepInterruptedError until `resume`; called from another thread."""
         self._interrupted.set()
 
     def _check_interrupted(self) -> None:
         if self._interrupted.is_set():
-            raise LinkError("the driver is stopping")
+            raise StepInterruptedError(STEP_INTERRUPTED)
 
     def resume(self) -> None:
-        """Read again, to take leave of the devices."""
+        """Read again."""
         self._interrupted.clear()
 
     def _first_byte(self, timeout: float) -> bytes:

@@ -15,7 +15,13 @@ import itertools
 from collections.abc import Callable, Iterator, Mapping
 
 from driver_common import clocks as time
-from driver_common.errors import DriverError, FrameError, NoAnswerError, RefusedError
+from driver_common.errors import (
+    DriverError,
+    FrameError,
+    NoAnswerError,
+    RefusedError,
+    StepInterruptedError,
+)
 from driver_common.sample_clock import HostClock, SampleClock
 from driver_common.settings import Value, read_settings
 from icotronic_driver import commands
@@ -223,6 +229,8 @@ class Acquisition:
         try:
             self._line.request(commands.START_ACCELERATION.request(STH_1, form),
                                self._longest_silence / 2)  # the first frame is the answer
+        except StepInterruptedError:  # it may have begun; who interrupted stops it
+            raise
         except DriverError:
             self.end_stream()
             raise

@@ -22,7 +22,13 @@ import can
 from driver_common import advice
 from driver_common import clocks as time
 from driver_common.can_link import RECEIVE_BUFFER, CanLink, parse_options
-from driver_common.errors import FrameError, LinkError, NoAnswerError
+from driver_common.errors import (
+    STEP_INTERRUPTED,
+    FrameError,
+    LinkError,
+    NoAnswerError,
+    StepInterruptedError,
+)
 from driver_common.host_pauses import HostPauses
 from driver_common.replayed_can import can_interface, can_recorder, open_can
 from icotronic_driver.commands import ACCELERATION_DATA
@@ -87,12 +93,14 @@ class Line:
                                   self.recorder)
         self._link: CanLink | None = None
         self._interrupted = threading.Event()
+        self._hurried = False
         self.interface = can_interface(interface, self.recorder)
         self.name = f"{interface} {channel}"
 
     def open(self) -> None:
         """Open the bus; raises LinkError."""
         self._link = self._make_link()
+        self._hurried = False
 
     def close(self) -> None:
         """Close the bus."""
@@ -101,8 +109,13 @@ class Line:
             self._link = None
 
     def interrupt(self) -> None:
-        """Have all requests be made once only, from now on; called from another thread."""
+        """Have requests end with a StepInterruptedError; called from another thread."""
         self._interrupted.set()
+
+    def resume(self, *, hurried: bool = False) -> None:
+        """Make requests again, each once only where that is hurried."""
+        self._hurried = hurried
+        self._interrupted.clear()
 
     @property
     def is_open(self) -> bool:
@@ -162,16 +175,16 @@ class Line:
             RefusedError: The node answered with an error.
             FrameError: The answer has a wrong length or content.
             NoAnswerError: Nothing came in time.
-            LinkError: The bus failed.
+            LinkError: The bus failed, or the driver is to stop.
         """
-        for _ in range(attempts - 1):
-            if self._interrupted.is_set():
-                break
+        for _ in range(0 if self._hurried else attempts - 1):
             with contextlib.suppress(NoAnswerError):
                 return self._attempt(request, timeout)
         return self._attempt(request, timeout)
 
     def _attempt(self, request: Request[T], timeout: float) -> T:
+        if self._interrupted.is_set():
+            raise StepInterruptedError(STEP_INTERRUPTED)
         self._open_again_if_silent()
         link = self.link
         self.pauses.wait(timeout)

@@ -57,6 +57,7 @@ class IcotronicBus(DeviceBus[Sensor]):
 
     def close(self) -> None:
         """Leave the sensor stopped and disconnected, and close the bus."""
+        self.line.resume(hurried=True)
         if self.line.is_open:
             with contextlib.suppress(DriverError):
                 self.maintenance.disconnect()
@@ -67,6 +68,10 @@ class IcotronicBus(DeviceBus[Sensor]):
     def interrupt(self) -> None:
         """Have the present step end soon; called from another thread."""
         self.line.interrupt()
+
+    def resume(self) -> None:
+        """Ask the sensor again."""
+        self.line.resume()
 
     def write(self, sensor: Sensor, changes: Mapping[str, Value]) -> dict[str, Value]:
         """Write settings, all or none, and return what the sensor reports; raises DriverError."""

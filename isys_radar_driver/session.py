@@ -91,7 +91,7 @@ class RadarBus(DeviceBus[Radar]):
         """Leave the radars stopped and close the port."""
         if not self.line.is_open:
             return
-        self.line.link.resume()
+        self.resume()
         for radar in self.devices:
             if radar.is_connected:
                 with contextlib.suppress(DriverError):
@@ -100,9 +100,14 @@ class RadarBus(DeviceBus[Radar]):
         self.line.close()
 
     def interrupt(self) -> None:
-        """Have the present step end soon with a LinkError; called from another thread."""
+        """Have the present step end soon; called from another thread."""
         with contextlib.suppress(LinkError):  # it is not open
             self.line.link.interrupt()
+
+    def resume(self) -> None:
+        """Ask the radars again."""
+        with contextlib.suppress(LinkError):
+            self.line.link.resume()
 
     def _open_link(self) -> None:
         self.line.open(self.connection.baud_candidates(self.devices[0])[0])

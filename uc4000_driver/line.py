@@ -139,9 +139,14 @@ class Line:
             self._link = None
 
     def interrupt(self) -> None:
-        """Have every wait end soon with a LinkError; called from another thread."""
+        """Have every wait end soon; called from another thread."""
         if self._link is not None:
             self._link.interrupt()
+
+    def resume(self) -> None:
+        """Wait for replies again."""
+        if self._link is not None:
+            self._link.resume()
 
     @property
     def link(self) -> SerialLink:

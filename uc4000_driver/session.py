@@ -88,6 +88,10 @@ class Uc4000Bus(DeviceBus[Sensor]):
         """Have the present step end soon; called from another thread."""
         self.line.interrupt()
 
+    def resume(self) -> None:
+        """Ask the sensors again."""
+        self.line.resume()
+
     def while_waiting(self, task: Callable[[], None]) -> None:
         """Have a task done now and then in long waits; what it asks of the sensors is refused."""
         self.line.on_wait = task

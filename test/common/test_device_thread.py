@@ -16,7 +16,13 @@ import threading
 import pytest
 
 from driver_common.device_thread import LONGEST_PAUSE, Backoff, DeviceThread
-from driver_common.errors import DriverError, LinkError, NoAnswerError, RefusedError
+from driver_common.errors import (
+    DriverError,
+    LinkError,
+    NoAnswerError,
+    RefusedError,
+    StepInterruptedError,
+)
 
 DEADLINE = 60.0  # s; far more than anything takes, also on a busy machine
 FOREVER = 3600.0  # s
@@ -49,8 +55,16 @@ class FakeBus:
 class InterruptibleBus(FakeBus):
     """A bus whose present step can be ended."""
 
+    def __init__(self):
+        super().__init__()
+        self.interrupted = threading.Event()
+
     def interrupt(self):
-        self.steps.put(LinkError("interrupted"))
+        self.interrupted.set()
+        self.steps.put(StepInterruptedError("interrupted"))
+
+    def resume(self):
+        self.events.append("resume")
 
 
 @pytest.fixture
@@ -260,6 +274,46 @@ def test_stopping_interrupts_a_step_where_the_bus_can(start):
     thread.stop()
     assert not thread.is_alive()
     assert states.empty()  # the interruption is no error
+
+
+def test_what_cannot_wait_ends_a_step_without_an_error(start):
+    bus = InterruptibleBus()
+    thread, states = start(bus)
+    opened(bus, states)
+    assert thread.call(lambda: bus.events[-1], DEADLINE, interrupt=True) == "resume"
+    assert "close" not in bus.events
+    assert states.empty()
+
+
+def test_what_cannot_wait_comes_first(start):
+    bus = InterruptibleBus()
+    thread, states = start(bus)
+    opened(bus, states)
+    done = []
+    urgent = threading.Thread(target=thread.call, args=(lambda: done.append("urgent"), DEADLINE),
+                              kwargs={"interrupt": True})
+
+    def job():
+        thread.post(lambda: done.append("usual"))
+        urgent.start()
+        bus.interrupted.wait(DEADLINE)
+
+    bus.steps.put(0.0)
+    thread.call(job, DEADLINE)
+    urgent.join(DEADLINE)
+    bus.steps.put(0.0)
+    thread.call(lambda: None, DEADLINE)
+    assert done == ["urgent", "usual"]
+
+
+def test_an_interruption_that_comes_too_late_changes_nothing(start):
+    bus = InterruptibleBus()
+    thread, states = start(bus)
+    opened(bus, states)
+    bus.interrupt()
+    assert thread.call(lambda: "done", DEADLINE, interrupt=True) == "done"
+    assert "close" not in bus.events
+    assert states.empty()
 
 
 def test_a_thread_that_was_never_started_can_be_stopped(bus):

@@ -284,6 +284,7 @@ def test_a_file_that_cannot_be_played_is_one_line(tmp_path, driver, text, fault)
     path.write_text(text.format(link=driver.link))
     with NodeProcess(driver.module, play(driver, path)) as process:
         assert process.wait() == 1
-    (line,) = [line for line in process.lines if line]
-    assert fault in line
-    assert f"cannot replay {path}: " in line
+    lines = [line for line in process.lines if line]
+    assert len(lines) == 1, lines
+    assert fault in lines[0]
+    assert f"cannot replay {path}: " in lines[0]

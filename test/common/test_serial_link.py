@@ -96,7 +96,7 @@ def test_reads_end_while_the_driver_is_stopping(terminal, link):
     terminal.write(b"something")
     link.interrupt()
     for _ in range(2):
-        with pytest.raises(LinkError, match="the driver is stopping"):
+        with pytest.raises(LinkError, match="the driver is to stop"):
             link.read(DEADLINE)
     link.resume()
     assert link.read(DEADLINE) == b"something"

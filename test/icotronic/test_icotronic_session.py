@@ -25,7 +25,13 @@ from types import SimpleNamespace
 import can
 import numpy as np
 import pytest
-from bus_master import BusMaster, BusRecorder, needs_errors_of_socketcand, wait_until
+from bus_master import (
+    DEADLINE,
+    BusMaster,
+    BusRecorder,
+    needs_errors_of_socketcand,
+    wait_until,
+)
 
 from driver_common import can_link
 from driver_common.device_thread import DeviceThread
@@ -786,6 +792,29 @@ def test_the_thread_ends_soon_although_nobody_answers(start, serve, impatient):
     service.stream()
     server.network.faults.silent = True
     service.thread.stop()  # for ever, if it waited for an answer
+
+
+def test_what_cannot_wait_ends_a_request_without_an_answer(start, serve, monkeypatch):
+    attempts, attempt = threading.Semaphore(0), Line._attempt
+    server = start()
+    service = serve(server)
+    service.stream()
+    request = Line.request
+
+    def ask_for_ever(line, asked, *_, **__):
+        return request(line, asked, 0.02, 10**9)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Line, "request", ask_for_ever)
+        patch.setattr(Line, "_attempt", lambda *args: attempts.release() or attempt(*args))
+        server.network.faults.silent = True
+        for _ in range(10):
+            assert attempts.acquire(timeout=DEADLINE)
+        assert service.thread.call(lambda: "done", DEADLINE, interrupt=True) == "done"
+    server.network.faults.silent = False
+    came = len(service.heard.streams[-1].frames)
+    wait_until(lambda: len(service.heard.streams[-1].frames) > came + 30)
+    assert service.states == [None]
 
 
 def test_a_server_that_says_nothing_hangs_neither_the_start_nor_the_end(monkeypatch, serve):

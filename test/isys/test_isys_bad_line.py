@@ -16,7 +16,7 @@ import random
 import time
 
 import pytest
-from bus_master import wait_until
+from bus_master import DEADLINE, wait_until
 from isys_master import (
     Lab,
     Master,
@@ -308,11 +308,35 @@ def test_a_stop_ends_the_search_for_a_radar_and_leaves_the_others_stopped(start)
             while True:
                 bus.poll()
 
-        with pytest.raises(LinkError, match="the driver is stopping"):
+        with pytest.raises(LinkError, match="the driver is to stop"):
             thread.call(interrupted)
     finally:
         thread.stop()
     assert not radar.measuring
+
+
+def test_a_deactivation_ends_the_search_for_a_radar_which_goes_on_afterwards(start):
+    line, radar, silent = start("iSYS-4001", addresses=[128, 129])
+    silent.silent = True
+    heard, states = Recorder(), []
+    bus = RadarBus(line.port, 0, [Options("front", address=128), Options("rear", address=129)],
+                   heard)
+    thread = DeviceThread("bus", bus, states.append)
+    thread.start()
+    try:
+        thread.call(lambda: bus.set_active(True))
+        wait_until(lambda: radar.measuring)
+        for _ in range(20):  # at any moment of the search
+            thread.call(lambda: bus.set_active(False), DEADLINE, interrupt=True)
+            assert not radar.measuring
+            thread.call(lambda: bus.set_active(True), DEADLINE, interrupt=True)
+            assert radar.measuring
+        silent.silent = False
+        wait_until(lambda: silent.measuring)
+    finally:
+        thread.stop()
+    assert states == [None]
+    assert heard.found == ["front", "rear"]
 
 
 def test_closing_leaves_every_radar_stopped(start):

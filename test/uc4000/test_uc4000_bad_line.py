@@ -585,7 +585,7 @@ class Babbler:
 
     def receive(self, data, now):
         self.was_asked.set()
-        return [(now, bytes(20 * 1920))]  # for 20 s
+        return [(now, bytes(60 * 1920))]  # for a minute
 
 
 def test_on_a_line_full_of_noise_users_are_answered():
@@ -596,12 +596,9 @@ def test_on_a_line_full_of_noise_users_are_answered():
     thread.start()
     try:
         assert babbler.was_asked.wait(DEADLINE)
-        begin = time.monotonic()
-        thread.call(lambda: bus.set_active(False))
+        thread.call(lambda: bus.set_active(False), DEADLINE, interrupt=True)
         with pytest.raises(NoAnswerError, match="is not connected"):
             thread.call(lambda: bus.maintenance.write(bus.devices[0], {"gain_db": 60.0}))
-        thread.stop()
-        assert time.monotonic() - begin < 15.0
     finally:
         thread.stop()
         line.close()
