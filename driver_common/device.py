@@ -10,10 +10,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from driver_common import clocks as time
 from driver_common.device_thread import Backoff
 from driver_common.errors import DriverError, NoAnswerError, RefusedError, SettingError
 from driver_common.settings import (
@@ -24,6 +25,27 @@ from driver_common.settings import (
     read_settings,
     write_settings,
 )
+
+RATE_WINDOW = 5.0  # s over which a rate is measured
+PAUSES = 2.0  # usual pauses after which silence counts
+
+
+def rate_of(arrivals: Sequence[float]) -> float:
+    """Return how often per s something came lately; less, the longer nothing comes any more.
+
+    Args:
+        arrivals: Monotonic times in s, of `RATE_WINDOW` s.
+    """
+    arrivals = tuple(arrivals)  # another thread may go on
+    if len(arrivals) < 2:
+        return 0.0
+    silence, duration = time.monotonic() - arrivals[-1], arrivals[-1] - arrivals[0]
+    if silence > RATE_WINDOW:
+        return 0.0
+    pauses = len(arrivals) - 1
+    if silence > PAUSES * duration / pauses:
+        duration += silence
+    return pauses / duration
 
 
 class Note(Protocol):

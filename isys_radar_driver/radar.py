@@ -15,9 +15,8 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from driver_common import clocks as time
 from driver_common.cycle_clock import CycleClock
-from driver_common.device import Device, DeviceOptions
+from driver_common.device import RATE_WINDOW, Device, DeviceOptions, rate_of
 from driver_common.errors import NoAnswerError
 from driver_common.serial_link import BITS_PER_BYTE
 from driver_common.settings import RecordAccess, Value, read_settings
@@ -29,7 +28,6 @@ from isys_radar_driver.plausibility import Continuity, Limits
 from isys_radar_driver.settings import OTHER_VIEW, coarser_first, record_of
 from isys_radar_driver.targets import TARGET_SIZES, Resolution
 
-RATE_WINDOW = 5.0  # s over which the rate is measured
 EARLY = 0.25  # cycles by which a list may come before it is expected
 
 
@@ -260,10 +258,7 @@ class Radar(Device):
     @property
     def rate(self) -> float:
         """Measured target lists per second."""
-        arrivals = self.arrivals
-        if len(arrivals) < 2 or time.monotonic() - arrivals[-1] > RATE_WINDOW:
-            return 0.0
-        return (len(arrivals) - 1) / (arrivals[-1] - arrivals[0])
+        return rate_of(self.arrivals)
 
     @property
     def is_overloaded(self) -> bool:

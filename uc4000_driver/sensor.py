@@ -14,14 +14,13 @@ from collections import Counter, deque
 from dataclasses import dataclass, field
 
 from driver_common import clocks as time
-from driver_common.device import Device, DeviceOptions
+from driver_common.device import RATE_WINDOW, Device, DeviceOptions, rate_of
 from driver_common.settings import Raw
 from uc4000_driver.commands import PROFILES, Distance, Outcome, Profile
 from uc4000_driver.telegram import CAST
 
 PRODUCT = "UC4000"
 FIELD_OF_VIEW = 0.26  # rad, 15°: assumed, the manual only draws the cones (errata U12)
-RATE_WINDOW = 5.0  # s over which the rate is measured
 
 
 @dataclass(frozen=True)
@@ -133,10 +132,7 @@ class Sensor(Device):
     @property
     def rate(self) -> float:
         """Measurements per second."""
-        arrivals = tuple(self.arrivals)  # another thread may ask
-        if len(arrivals) < 2 or time.monotonic() - arrivals[-1] > RATE_WINDOW:
-            return 0.0
-        return (len(arrivals) - 1) / (arrivals[-1] - arrivals[0])
+        return rate_of(self.arrivals)
 
     @property
     def wants_temperature(self) -> bool:
