@@ -19,16 +19,16 @@ import itertools
 
 from isys_master import Master
 
-from driver_common import device_bus
+from driver_common import device, device_bus
 from driver_common.serial_link import BITS_PER_BYTE
 from driver_common.simulator.line import Faults
-from isys_radar_driver import access, acquisition, connection, line, radar, session
+from isys_radar_driver import access, acquisition, connection, line, session
 from isys_radar_driver.models import find_model
 from isys_radar_driver.simulator import radar as simulated_radar
 from isys_radar_driver.simulator.line import SimulatedRadars
 from isys_radar_driver.simulator.radar import SimulatedRadar
 
-MODULES = (access, acquisition, connection, device_bus, line, radar, session, simulated_radar)
+MODULES = (access, acquisition, connection, device_bus, line, device, session, simulated_radar)
 EPOCH = 1_700_000_000.0  # s
 
 
