@@ -180,9 +180,9 @@ class ParameterNode(LifecycleNode):
     def _show_settings(self, sensor: str, device: Any) -> None:
         if self.bus is None or device not in self.bus.devices:
             return
-        # As they are now, because a set may have come since; between two steps of the bus.
-        settings, values = self.call(lambda: (dict(device.settings), dict(device.values)))
-        if settings.keys() != values.keys():  # the device was lost while it was read
+        # As they are now, because a set may have come since; the bus may be busy for long.
+        settings, values = dict(device.settings), dict(device.values)
+        if settings.keys() != values.keys():  # it is being read, and will be shown afterwards
             return
         prefix = self.prefix(sensor)
         gone = [name for name, owner in self._devices.items()
