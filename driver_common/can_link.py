@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import logging
 import os
 import re
@@ -19,6 +20,7 @@ import time
 from collections.abc import Sequence
 
 import can
+import serial
 
 from driver_common.advice import CAN_ERRORS, NO_ACKNOWLEDGE
 from driver_common.errors import LinkError, SettingError
@@ -171,18 +173,32 @@ class CanLink:
             if isinstance(cause, OSError) and cause.errno in CAN_ERRORS:
                 return CAN_ERRORS[cause.errno].text(channel=self.channel, bitrate=self._bitrate,
                                                     where=" in can_options")
+            if isinstance(cause, serial.SerialException) and cause.errno == errno.ENOENT:
+                return f"there is no serial port {self.channel}; can_channel is the path of one"
             cause = cause.__cause__ or cause.__context__
         if self.interface not in can.VALID_INTERFACES:
             known = sorted(can.VALID_INTERFACES)
             return (f"python-can has no such interface{suggestion(self.interface, known)} "
                     f"(it has {', '.join(known)})")
+        if isinstance(error, can.CanInterfaceNotImplementedError):
+            return _lacking(str(error))
         if "buffer full" in str(error):
             return NO_ACKNOWLEDGE.text()
         if isinstance(error, TimeoutError):
             return "no answer; check host and port in can_options"
         if isinstance(error, socket.gaierror):
             return f"{error.strerror}; check host in can_options"
-        return str(error.__cause__ or error).partition("\n")[0] or type(error).__name__
+        text = str(error.__cause__ or error).partition("\n")[0] or type(error).__name__
+        return f"can_{text}" if text.startswith("channel ") else text
+
+
+def _lacking(text: str) -> str:
+    """Return in words why python-can has an interface that does not work here."""
+    if not text.startswith("Cannot import"):
+        return text.partition("\n")[0]
+    package = re.search(r"No module named '(\w+)'", text)
+    what = f"the Python package {package[1]}" if package else "the library of its maker"
+    return f"python-can needs {what} for it, which is not here; see its page on this interface"
 
 
 def parse_options(options: Sequence[str]) -> dict[str, object]:

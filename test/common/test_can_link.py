@@ -365,6 +365,33 @@ def test_an_interface_that_python_can_does_not_have_is_named_with_the_nearest():
     assert "socketcand" in str(caught.value)
 
 
+@pytest.mark.parametrize("interface", sorted(can.VALID_INTERFACES - {
+    "socketcan", "socketcand", "udp_multicast", "virtual"}))
+def test_an_interface_that_does_not_work_here_says_why_in_words(interface):
+    with pytest.raises(LinkError) as caught:
+        open_link(interface, "no_such_channel")
+    text = str(caught.value)
+    assert text.startswith(f"cannot open {interface} no_such_channel: ")
+    for word in ("\n", "import", "module '", "Errno", os.path.dirname(can.__file__), "__"):
+        assert word not in text
+
+
+@pytest.mark.parametrize(("error", "text"), [
+    ("Cannot import module can.interfaces.gs_usb for CAN interface 'gs_usb': No module named 'usb'",
+     "python-can needs the Python package usb for it, which is not here"),
+    ("Cannot import module can.interfaces.ixxat for CAN interface 'ixxat': cannot import name "
+     "'HRESULT' from 'can.ctypesutil' (/somewhere/can/ctypesutil.py)",
+     "python-can needs the library of its maker for it, which is not here"),
+    ("The Vector interface is only supported on Windows\nsorry",
+     "The Vector interface is only supported on Windows"),
+])
+def test_what_an_interface_lacks_is_told(failing, error, text):
+    failing(can.CanInterfaceNotImplementedError(error))
+    with pytest.raises(LinkError) as caught:
+        open_link("gs_usb")
+    assert str(caught.value).startswith(f"cannot open gs_usb can0: {text}")
+
+
 def test_a_channel_that_is_not_there_is_an_error_in_words():
     with pytest.raises(LinkError) as caught:
         open_link("socketcan", "can_not")
