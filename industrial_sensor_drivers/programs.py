@@ -36,11 +36,22 @@ class OwnPackages:
         return PathFinder.find_spec(name, [HERE]) if name in OWN else None
 
 
-def _program(module: str, function: str = "main") -> Callable[[], object]:
+def _program(module: str, function: str = "main", *arguments: str) -> Callable[[], object]:
     """Return what imports a module and calls a function of it."""
     def run() -> object:
         sys.meta_path.insert(0, OwnPackages)
-        return getattr(importlib.import_module(module), function)()
+        return getattr(importlib.import_module(module), function)(*arguments)
+
+    return run
+
+
+def _node(name: str) -> Callable[[], object]:
+    """Return what runs a node, or tells how to where that is asked."""
+    def run() -> object:
+        own = sys.argv[1:sys.argv.index("--ros-args")] if "--ros-args" in sys.argv else sys.argv
+        program = (_program("sensor_tools.document", "print_help", name)
+                   if {"-h", "--help"} & {*own} else _program(f"{name}_driver.program"))
+        return program()
 
     return run
 
@@ -48,10 +59,10 @@ def _program(module: str, function: str = "main") -> Callable[[], object]:
 convert_imu = _program("sensor_tools.convert_imu")
 demo = _program("sensor_tools.demo.program")
 doctor = _program("sensor_tools.cli.program", "doctor_main")
-icotronic_node = _program("icotronic_driver.program")
-isys_radar_node = _program("isys_radar_driver.program")
+icotronic_node = _node("icotronic")
+isys_radar_node = _node("isys_radar")
 radar_scan = _program("sensor_tools.radar_scan")
 record_qos = _program("sensor_tools.record_qos")
 sensors = _program("sensor_tools.cli.program")
 simulate = _program("sensor_tools.simulate")
-uc4000_node = _program("uc4000_driver.program")
+uc4000_node = _node("uc4000")

@@ -309,6 +309,27 @@ def diagnostics(driver: Driver) -> str:
 
 # --- files ---
 
+# --- help ---
+
+def help_text(driver: Driver) -> str:
+    """Return how to run a node, what it publishes, and its parameters."""
+    topics = {f"~/{name}": topic.kind for name, topic in driver.node.TOPICS.items()}
+    width = max(map(len, topics))
+    return "\n".join([
+        f"usage: ros2 run industrial_sensor_drivers {driver.name}_node [--ros-args "
+        "[-p NAME:=VALUE] ... [--params-file FILE] [-r FROM:=TO] ...]", "",
+        f"Driver of {driver.title}. It publishes, beside /diagnostics:", "",
+        *(f"  {name:{width}}  {kind.__module__.partition('.')[0]}/msg/{kind.__name__}"
+          for name, kind in topics.items()), "",
+        "Its parameters follow, as a file for --params-file.", "", parameter_file(driver)])
+
+
+def print_help(name: str) -> int:
+    """Print the help of a node; return the exit code."""
+    print(help_text(next(driver for driver in DRIVERS if driver.name == name)), end="")
+    return 0
+
+
 def documents() -> dict[Path, str]:
     """Return all files with what they should hold."""
     files = {}

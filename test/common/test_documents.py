@@ -10,6 +10,8 @@
 
 import re
 import runpy
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -55,6 +57,24 @@ def test_a_stale_one_is_named(monkeypatch, capsys):
     assert capsys.readouterr().out == (
         "README.rst is stale\nRun 'python -m sensor_tools.document'.\n"
     )
+
+
+@pytest.mark.parametrize("name", DRIVERS)
+@pytest.mark.parametrize("word", ["-h", "--help"])
+def test_a_node_tells_its_topics_and_parameters_without_the_middleware(name, word):
+    program = ("import rclpy; rclpy.init = None; "
+               f"from industrial_sensor_drivers.programs import {name}_node; {name}_node()")
+    done = subprocess.run([sys.executable, "-c", program, word], cwd=ROOT, text=True, timeout=60,
+                          capture_output=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    usage, _, described = done.stdout.partition("\n")
+    assert usage.startswith(f"usage: ros2 run industrial_sensor_drivers {name}_node ")
+    for topic in DRIVERS[name].node.TOPICS:
+        assert f"  ~/{topic} " in described
+    driver = DRIVERS[name]
+    for row in (*(option.name for option in driver.options),
+                *filter(driver.variants, driver.node.ALL_SETTINGS)):
+        assert re.search(rf"^ +(# )?{re.escape(row)}: ", described, re.MULTILINE), row
 
 
 @pytest.mark.parametrize("path", PARAMETER_FILES, ids=lambda path: path.name)
