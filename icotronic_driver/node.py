@@ -416,7 +416,9 @@ class IcotronicNode(DeviceNode, Listener):
         return f"saving would change {_changes(self.call(self.bus.maintenance.unsaved))}"
 
     def _save(self) -> str:
-        return f"saved {_changes(self.call(self.bus.maintenance.save))} in the sensor's EEPROM"
+        changes = self.call(self.bus.maintenance.save)
+        return (f"saved {_changes(changes)} in the sensor's EEPROM" if changes
+                else "the sensor's EEPROM holds all of it already")
 
     # --- diagnostics ---
 

@@ -160,7 +160,8 @@ def _save_sth(bus: IcotronicBus, sensor: Sth) -> str:
         raise SettingError("nothing was changed since the sensor was connected; its EEPROM can "
                            "take changes only in the same run, so use 'sensors set --save'")
     fields = bus.maintenance.save()
-    return "saved in its EEPROM: " + (", ".join(field.name for field in fields) or "nothing")
+    names = ", ".join(field.name for field in fields)
+    return f"saved in its EEPROM: {names}" if names else "its EEPROM holds all of it already"
 
 
 def _has_not(what: str) -> Callable[..., Any]:

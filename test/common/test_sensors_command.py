@@ -221,7 +221,7 @@ def test_a_radar_keeps_what_is_saved(bench, command, way):
 def test_an_sth_keeps_what_is_set_and_saved_in_one_run(bench, command):
     network, words = bench.network("One")
     outcome = command("set", *words, "name=Spindle", "--save")
-    assert outcome.out.splitlines()[0] == "name: One → Spindle"
+    assert outcome.out.splitlines() == ["name: One → Spindle", "its EEPROM holds all of it already"]
     assert network.sensors[0].name == "Spindle"
     outcome = command("save", *words)
     assert outcome.code == 1
