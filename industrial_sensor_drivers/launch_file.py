@@ -78,6 +78,15 @@ def include_driver(name: str, params_file: str, link: Mapping[str, str]) -> Grou
     """
     arguments = {"params_file": shared("config", params_file),
                  **{own: LaunchConfiguration(outer) for own, outer in link.items()}}
+    return _include(name, arguments)
+
+
+def include_description(model: Any) -> GroupAction:
+    """Return what publishes the frames of a URDF or xacro file, with arguments that end with it."""
+    return _include("description", {"model": model})
+
+
+def _include(name: str, arguments: Mapping[str, Any]) -> GroupAction:
     return GroupAction([IncludeLaunchDescription(
         PythonLaunchDescriptionSource(shared("launch", f"{name}.launch.py")),
         launch_arguments=arguments.items())])

@@ -10,12 +10,13 @@
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
+from launch.substitutions import LaunchConfiguration
 
-from industrial_sensor_drivers.launch_file import include_driver
+from industrial_sensor_drivers.launch_file import include_description, include_driver, shared
 
 
 def generate_launch_description():
-    """Describe the three nodes; each serves all sensors on its wire."""
+    """Describe the three nodes, each of which serves all sensors on its wire, and the frames."""
     return LaunchDescription([
         DeclareLaunchArgument("radar_port", default_value="/dev/isys_radar",
                               description="RS-485 adapter of the radars, named by a udev rule."),
@@ -23,9 +24,12 @@ def generate_launch_description():
                               description="LIN adapter of the ultrasonic sensors, as well."),
         DeclareLaunchArgument("can_interface", default_value="socketcan",
                               description="Interface of python-can, or sim."),
+        DeclareLaunchArgument("machine_model", default_value=shared("urdf", "machine.urdf.xacro"),
+                              description="URDF or xacro file with the frames of the sensors."),
         include_driver("isys_radar", "isys_radars_on_one_line.yaml",
                        {"serial_port": "radar_port"}),
         include_driver("uc4000", "uc4000_sensors_on_one_line.yaml",
                        {"serial_port": "ultrasonic_port"}),
         include_driver("icotronic", "icotronic.yaml", {"can_interface": "can_interface"}),
+        include_description(LaunchConfiguration("machine_model")),
     ])

@@ -31,6 +31,11 @@ def include(name, **arguments):
     return IncludeLaunchDescription(source, launch_arguments=arguments.items())
 
 
+def read_parameters(name):
+    content = yaml.safe_load((ROOT / "config" / f"{name}.yaml").read_text())
+    return content["/**"]["ros__parameters"]
+
+
 @pytest.mark.parametrize("name", DRIVERS)
 def test_one_driver(name):
     assert launch_stand_in.start(include(name)) == [
@@ -48,12 +53,20 @@ def test_no_default_leaks_into_what_is_included_next(names):
 
 
 def test_a_whole_machine():
-    assert launch_stand_in.start(include("machine"), radar_port="/dev/radars") == [
+    pytest.importorskip("xacro")
+    *drivers, description = launch_stand_in.start(include("machine"), radar_port="/dev/radars")
+    assert drivers == [
         ("isys_radar_node", "isys_radar", "", ["isys_radars_on_one_line.yaml"],
          {"serial_port": "/dev/radars"}),
         ("uc4000_node", "uc4000", "", ["uc4000_sensors_on_one_line.yaml"],
          {"serial_port": "/dev/uc4000"}),
         ("icotronic_node", "icotronic", "", ["icotronic.yaml"], {"can_interface": "socketcan"})]
+    robot = ElementTree.fromstring(description[-1]["robot_description"])
+    frames = [value for name in ("isys_radars_on_one_line", "uc4000_sensors_on_one_line",
+                                 "icotronic")
+              for key, value in read_parameters(name).items() if key.endswith("frame_id")]
+    assert len(frames) == 8
+    assert {link.get("name") for link in robot.iter("link")} == {"base_link", *frames}
 
 
 @pytest.mark.parametrize("name", DRIVERS)
