@@ -172,9 +172,9 @@ class SimulatedNetwork:
                 when, _, frame = heapq.heappop(self._answers)
                 due.append((when, frame))
             for rate, frames in self._others():
-                if now >= self._next_of_others[frames]:
+                if now >= (next_one := self._next_of_others[frames]):
                     due.append((now, next(frames)))
-                    self._next_of_others[frames] = now + 1 / rate
+                    self._next_of_others[frames] = max(now, next_one + 1 / rate)
             if self.faults.silent:
                 return []
             self.streamed += streamed

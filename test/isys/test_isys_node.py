@@ -788,8 +788,9 @@ def test_the_rate_on_a_shared_line_is_compared_with_what_it_can_carry(
 def test_settings_that_differ_are_in_the_diagnostics(station):
     here = station(parameters={"config_mode": "check", "output1.range_max": 42.0})
     here.process.wait_for_line("output1.range_max is 150 m, not 42 m")
-    status = here.ros.wait_for_status("isys_radar: radar", lambda status: status.level == WARN)
-    assert status.message == "1 settings are not as wanted"
+    status = here.ros.wait_for_status("isys_radar: radar", lambda status: (
+        status.message == "1 settings are not as wanted"))
+    assert status.level == WARN
     assert status.values["output1.range_max differs"] == "wanted 42.0, reported 150.0"
     assert here.radar.value("output1.range_max") == 150.0
     assert here.remote.set("output1.range_max", 42.0).successful
