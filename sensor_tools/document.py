@@ -307,8 +307,6 @@ def diagnostics(driver: Driver) -> str:
                    ((f"`{key.text}`", key.meaning) for key in driver.health.keys)), ""])
 
 
-# --- files ---
-
 # --- help ---
 
 def help_text(driver: Driver) -> str:
@@ -329,6 +327,8 @@ def print_help(name: str) -> int:
     print(help_text(next(driver for driver in DRIVERS if driver.name == name)), end="")
     return 0
 
+
+# --- files ---
 
 def documents() -> dict[Path, str]:
     """Return all files with what they should hold."""
