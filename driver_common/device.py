@@ -81,6 +81,7 @@ class Device:
         unsaved: Settings that this driver changed and that were not saved since.
         enabled: Whether it is to measure, as far as the user of the services says.
         error: What is wrong with it; why it is not connected.
+        told: What was wrong before, with the monotonic time in s when it was last so.
         misses: Number of steps without a good answer.
         connections: How often it was found.
         backoff: Pauses between attempts to find it.
@@ -99,6 +100,7 @@ class Device:
         self.unsaved: set[str] = set()
         self.enabled = True
         self.error: DriverError | None = None
+        self.told: dict[str, float] = {}
         self.misses = 0
         self.connections = 0
         self.backoff = Backoff()

@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Iterable, Iterator
 from functools import partial
 from typing import Generic, TypeVar
@@ -30,6 +31,7 @@ from driver_common.errors import (
 DeviceT = TypeVar("DeviceT", bound=Device)
 
 MISSES_UNTIL_LOST = 3
+NEWS_TIME = 60.0  # s in which a reason is told once, though others come between
 
 
 class Listener(Generic[DeviceT]):
@@ -42,7 +44,7 @@ class Listener(Generic[DeviceT]):
         """Tell that values of settings were read again."""
 
     def on_lost(self, device: DeviceT, error: DriverError) -> None:
-        """Tell that the device is not there (any more), once per change of the reason."""
+        """Tell that the device is not there (any more), or a reason that was not told lately."""
 
     def on_note(self, device: DeviceT, text: str, *, warning: bool = False) -> None:
         """Tell something worth a line in the log."""
@@ -183,12 +185,19 @@ class DeviceBus(Generic[DeviceT]):
 
     def _lose(self, device: DeviceT, error: DriverError) -> None:
         """Note that a device is not there; it is looked for more and more rarely."""
-        news = device.is_connected or self._gist(device.error) != self._gist(error)
+        news = device.is_connected or self._is_news(device, error)
+        device.told[self._gist(error)] = time.monotonic()
         device.forget()
         device.error = error
         device.due = time.monotonic() + self._pause(device)
         if news:
             self._listener.on_lost(device, error)
+
+    def _is_news(self, device: DeviceT, error: DriverError) -> bool:
+        """Whether the reason is another one, and none that was told lately: some take turns."""
+        gist = self._gist(error)
+        return (gist != self._gist(device.error)
+                and time.monotonic() - device.told.get(gist, -math.inf) > NEWS_TIME)
 
     def _pause(self, device: DeviceT) -> float:
         """Return how long to leave a device alone that does not do what it should."""

@@ -350,6 +350,33 @@ def test_closing_leaves_every_radar_stopped(start):
     assert not second.measuring
 
 
+# --- what is told -------------------------------------------------------------------------------
+
+EVERYTHING = {*range(0x100)}  # function codes
+TROUBLES = {
+    "nothing answers": lambda link, second: setattr(link.radars[0], "silent", True),
+    "it goes and comes": lambda link, second: setattr(link.radars[0], "silent", second % 20 > 9),
+    "it refuses everything": lambda link, second: setattr(link.radars[0], "refuse", EVERYTHING),
+    "a stuck transmitter": lambda link, second: setattr(link, "noise", b"\x55" * 64),
+    "a bad line": lambda link, second: setattr(link.faults, "damage", 0.01),
+    "a line that hardly works": lambda link, second: setattr(link.faults, "damage", 0.1),
+}
+
+
+@pytest.mark.parametrize("trouble", TROUBLES)
+def test_a_minute_of_trouble_is_a_few_lines(monkeypatch, trouble):
+    link = VirtualLink(VirtualTime(), "iSYS-4001")
+    master = VirtualMaster(monkeypatch, link, Options())
+    master.bus.set_active(True)
+    heard = master.heard
+    before, end = len(heard.found), link.clock.now + 60.0
+    while link.clock.now < end:
+        TROUBLES[trouble](link, link.clock.now)
+        link.clock.sleep(master.bus.poll())
+    told = [*heard.notes, *heard.lost, *heard.found[before:]]
+    assert len(told) <= 12, told
+
+
 # --- a bad line --------------------------------------------------------------------------------
 
 EVERYTHING = {"drop": 0.05, "corrupt": 0.1, "noise": 0.5, "split": 0.005, "echo": True}
