@@ -29,3 +29,14 @@ def calls(action: Callable[[], object]) -> int:
     finally:
         sys.setprofile(before)
     return count
+
+
+class Counting(bytearray):
+    """Bytes which count how many of them are looked at."""
+
+    looks = 0
+
+    def __getitem__(self, key):  # type: ignore[no-untyped-def]
+        found = super().__getitem__(key)
+        Counting.looks += len(found) if isinstance(key, slice) else 1
+        return found

@@ -16,6 +16,7 @@ from collections.abc import Iterable
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from operations import Counting
 
 from bench.examples.isys import EXAMPLES, HAND_TYPED, Example, Targets
 from isys_radar_driver.frames import Delimiter, Frame, FrameParser
@@ -393,17 +394,6 @@ def test_noise_without_an_end_fills_no_memory_where_no_raw_signals_may_come(nois
     for _ in range(2000):
         assert not list(parser.feed(bytes.fromhex(noise)))
         assert parser.pending <= 500
-
-
-class Counting(bytearray):
-    """Bytes which count how many of them are looked at."""
-
-    looks = 0
-
-    def __getitem__(self, key):  # type: ignore[no-untyped-def]
-        found = super().__getitem__(key)
-        Counting.looks += len(found) if isinstance(key, slice) else 1
-        return found
 
 
 @pytest.mark.parametrize("noise", [

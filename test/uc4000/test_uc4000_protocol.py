@@ -20,6 +20,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import pytest
+from operations import Counting
 
 from bench.examples.uc4000 import (
     REFUSALS,
@@ -364,17 +365,6 @@ def test_noise_without_end_is_not_kept(length: int) -> None:
     parser.gap()
     parser.feed(VERSION if length == 19 else bytes.fromhex("23 D1"))
     assert parser.complete
-
-
-class Counting(bytearray):
-    """Bytes which count how many of them are looked at."""
-
-    looks = 0
-
-    def __getitem__(self, key):  # type: ignore[no-untyped-def]
-        found = super().__getitem__(key)
-        Counting.looks += len(found) if isinstance(key, slice) else 1
-        return found
 
 
 @pytest.mark.parametrize("length", [2, 3, 12, 34])
