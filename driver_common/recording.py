@@ -222,7 +222,7 @@ class _Reader:
             kind = _KINDS.get(word)
             if kind is None:
                 raise ValueError(f'"{word}" is not known')
-            content = pack_offset(int(text)) if kind is Kind.OFFSET else text.encode()
+            content = _offset_content(text) if kind is Kind.OFFSET else text.encode()
             self._add(int(seconds) * SECOND + int(fraction), kind, content)
         elif match := _HEADER_LINE.fullmatch(line):
             title, text = match.groups()
@@ -247,7 +247,10 @@ class _Reader:
         if match is None:
             raise ValueError
         seconds, fraction, digits, data, letter = match.groups()
-        identifier = int(digits, 16) | (EXTENDED if len(digits) > 3 else 0) | (
+        number = int(digits, 16)
+        if number & (EXTENDED | REMOTE):
+            raise ValueError(f"{digits} is no identifier of 29 bits")
+        identifier = number | (EXTENDED if len(digits) > 3 else 0) | (
             REMOTE if data == "R" else 0)
         shown = int(seconds) * 1000000 + int(fraction)
         received = letter == "R"
@@ -276,6 +279,13 @@ class _Reader:
         count = line.removeprefix(_END).strip()
         if count and count != "…" and int(count) != len(self._entries):
             raise ValueError(f"{count} entries should be there, there are {len(self._entries)}")
+
+
+def _offset_content(text: str) -> bytes:
+    offset = int(text)
+    if abs(offset) >= 1 << 63:
+        raise ValueError("no clock is so far away")
+    return pack_offset(offset)
 
 
 def _clock(nanoseconds: int) -> str:
