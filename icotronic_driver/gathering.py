@@ -106,6 +106,7 @@ class Gatherer:
         self._conversion = conversion
         self._use = use
         self._begin = self._end = 0
+        self._seen = 0, 0  # begin of the period and its frames at the last look
         self._firsts: list[int] = []
         self._steps: list[int] = []
         self._values: list[int] = []
@@ -131,8 +132,14 @@ class Gatherer:
         self._begin = self._end = 0
 
     def is_late(self, now: int) -> bool:
-        """Whether a period that has something is over since at least `LATE` at `now` in ns."""
-        return bool(self._firsts or len(self._rest)) and now > self._end + LATE
+        """Whether a period that has something is over since at least `LATE` at `now` in ns.
+
+        While frames come it is not: they may have waited for a busy host.
+        """
+        state = self._begin, len(self._firsts)
+        nothing_came, self._seen = state == self._seen, state
+        return (nothing_came and bool(self._firsts or len(self._rest))
+                and now > self._end + LATE)
 
     def _hand_over(self) -> None:
         """Hand over all periods but the last, which may not be complete."""

@@ -148,3 +148,13 @@ def test_what_waits_is_handed_over_when_nothing_follows(batch):
     stream.take(START, 100.0, (1, 2))
     stream.look(START)
     assert len(batch.periods) == 2
+
+
+def test_a_period_is_whole_though_its_frames_waited_for_a_busy_host(batch):
+    stream = Stream([batch.consumer], 0)
+    for frame in range(4):
+        stream.take(START + 300 * frame, 100.0, (1, 2))
+        stream.look(START + PERIOD + 2 * LATE)
+    assert not batch.periods
+    stream.look(START + PERIOD + 2 * LATE)
+    assert len(batch.periods) == 1
