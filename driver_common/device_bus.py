@@ -128,7 +128,7 @@ class DeviceBus(Generic[DeviceT]):
 
     def set_enabled(self, device: DeviceT, enabled: bool) -> None:
         """Start or stop one device; raises DriverError."""
-        self._require(device)
+        self.require(device)
         if enabled and not self.active:
             raise SettingError("the node is not active, so nothing would be published; "
                                "activate it first")
@@ -206,7 +206,7 @@ class DeviceBus(Generic[DeviceT]):
         device.backoff.last = 10.0 if others_work else 2.0
         return device.backoff.pause()
 
-    def _require(self, device: DeviceT) -> None:
+    def require(self, device: DeviceT) -> None:
         """Raise NoAnswerError where a device is not connected."""
         if not device.is_connected:
             reason = self.link_error or device.error or "still searching"

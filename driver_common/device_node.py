@@ -12,22 +12,24 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple, Protocol
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticStatus
 from lifecycle_msgs.srv import ChangeState
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
+from rclpy.publisher import Publisher
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
 from driver_common import diagnostics, node_recorder, program
-from driver_common.device_thread import Bus, DeviceThread
+from driver_common.device_thread import CALL_TIMEOUT, Bus, DeviceThread
 from driver_common.errors import DriverError, SettingError
 from driver_common.middleware import let_events_wait
 from driver_common.node_recorder import NodeRecorder
@@ -36,6 +38,8 @@ from driver_common.recording import SERIAL
 from driver_common.settings import Option
 
 STOP_TIME = 2.0  # s for which a user waits until devices are stopped
+
+Action = Callable[[], Awaitable[str]]
 
 CONFIG_MODES = {"push": 0, "check": 1, "leave": 2}
 
@@ -96,12 +100,13 @@ class DeviceNode(ParameterNode):
         self._statuses_made = 0.0
         self._diagnostics = diagnostics.Diagnostics(self)
         self._recorder = NodeRecorder(self, self.LINK, self.channel, self.link_facts)
-        self._entities: list[Callable[[], object]] = []
+        self._entities: list[Publisher] = []
         self.create_timer(diagnostics.PERIOD, self._publish_diagnostics,
                           clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.create_timer(node_recorder.PERIOD, self._recorder.write_raw,
                           clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._refuse_impossible_transitions()
+        self._add_services()
 
     # --- what a driver provides ---
 
@@ -110,9 +115,12 @@ class DeviceNode(ParameterNode):
         raise NotImplementedError
 
     def make_interfaces(self, sensor: str) -> None:
-        """Create the publishers and services of a sensor that do not depend on its model."""
-        for name, enabled in (("start_acquisition", True), ("stop_acquisition", False)):
-            self.add_trigger(sensor, name, partial(self._enable, sensor, enabled))
+        """Create the publishers of a sensor that do not depend on its model."""
+
+    def services_of(self, sensor: str) -> dict[str, Action]:
+        """Return what a user can have done with a sensor, each with its name and its answer."""
+        return {"start_acquisition": partial(self._enable, sensor, True),
+                "stop_acquisition": partial(self._enable, sensor, False)}
 
     def channel(self) -> str:
         """Return the name of the bus in a recording, "" where it has none."""
@@ -132,16 +140,13 @@ class DeviceNode(ParameterNode):
 
     # --- the bus ---
 
-    def call(self, job: Callable[[], Any]) -> Any:
-        """Run a job in the thread of the bus; raises DriverError."""
-        return self._running_thread.call(job)
-
-    def stop_devices(self, job: Callable[[], Any]) -> None:
-        """Have a job stop devices, whatever the bus is doing; raises DriverError.
-
-        The bus goes on with it where it takes longer than anybody wants to wait.
-        """
-        self._running_thread.call(job, STOP_TIME, interrupt=True)
+    async def call(self, job: Callable[[], Any], timeout: float = CALL_TIMEOUT, *,
+                   interrupt: bool = False) -> Any:
+        """Run a job in the thread of the bus while others are served; see `DeviceThread.call`."""
+        executor = self.executor
+        assert executor is not None  # which runs this
+        return await self._running_thread.ask(job, timeout, interrupt=interrupt,
+                                              on_done=executor.wake)
 
     @property
     def _running_thread(self) -> DeviceThread:
@@ -160,22 +165,25 @@ class DeviceNode(ParameterNode):
                 f"{self.get_fully_qualified_name()} configure'")
 
     def device(self, sensor: str) -> Any:
-        """Return the device of a sensor; the node is configured."""
+        """Return the device of a sensor; raises DriverError where the node is not configured."""
+        if self.bus is None:
+            raise DriverError(self._unconfigured())
         return next(device for device in self.bus.devices if device.options.name == sensor)
 
-    def _enable(self, sensor: str, enabled: bool) -> str:
-        call = self.call if enabled else self.stop_devices
-        call(lambda: self.bus.set_enabled(self.device(sensor), enabled))
+    async def _enable(self, sensor: str, enabled: bool) -> str:
+        # The bus goes on with it where it takes longer than anybody wants to wait.
+        await self.call(lambda: self.bus.set_enabled(self.device(sensor), enabled),
+                        CALL_TIMEOUT if enabled else STOP_TIME, interrupt=not enabled)
         return f"acquisition {'started' if enabled else 'stopped'}"
 
-    def give_address(self, sensor: str, give: Callable[[int], object]) -> str:
+    async def give_address(self, sensor: str, give: Callable[[int], object]) -> str:
         """Run `give` with the parameter new_address; return what the user is told then."""
         prefix = self.prefix(sensor)
         address = self.option("new_address", sensor)
         if not address:
             raise SettingError(f"set the parameter {prefix}new_address first")
         old = self.device(sensor).address
-        self.call(lambda: give(address))
+        await self.call(lambda: give(address))
         self.store.store({prefix + "address": address, prefix + "new_address": 0})
         return (f"the sensor moved from address {old} to {address} and keeps it; put "
                 f"'{prefix}address: {address}' into your parameter file")
@@ -258,7 +266,7 @@ class DeviceNode(ParameterNode):
             topic = self.resolve_topic_name(topic)
             raise SettingError(f"cannot publish {topic}, check its parameters qos_overrides."
                                f"{topic}.publisher.*: {error or 'a wrong type'}") from error
-        self._entities.append(lambda: self.destroy_publisher(publisher))
+        self._entities.append(publisher)
         return publisher
 
     def while_running(self, publish: Callable[..., None]) -> Callable[..., None]:
@@ -272,11 +280,21 @@ class DeviceNode(ParameterNode):
 
         return call
 
-    def add_trigger(self, sensor: str, name: str, action: Callable[[], str]) -> None:
-        """Create a service which runs `action` and answers with its text, or with its error."""
-        def handle(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def _add_services(self) -> None:
+        """Create the services, which answer in any state, and while others wait for theirs."""
+        services = {self.topic(sensor, name): action for sensor in self.sensors
+                    for name, action in self.services_of(sensor).items()}
+        services["~/save_recording"] = self._recorder.save
+        group = ReentrantCallbackGroup()
+        for topic, action in services.items():
+            self.create_service(Trigger, topic, self._answering(topic.rpartition("/")[2], action),
+                                callback_group=group)
+
+    def _answering(self, name: str, action: Action) -> Callable[..., Awaitable[Trigger.Response]]:
+        """Return what answers a service with the text of an action, or with its error."""
+        async def handle(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
             try:
-                response.message = action()
+                response.message = await action()
                 response.success = True
             except DriverError as error:
                 response.message = str(error)
@@ -288,8 +306,7 @@ class DeviceNode(ParameterNode):
                 self.get_logger().error(f"{name}: {response.message}")
             return response
 
-        service = self.create_service(Trigger, self.topic(sensor, name), handle)
-        self._entities.append(lambda: self.destroy_service(service))
+        return handle
 
     # --- diagnostics ---
 
@@ -357,7 +374,6 @@ class DeviceNode(ParameterNode):
             bus = self.make_bus()
             for sensor in self.sensors:
                 self.make_interfaces(sensor)
-            self.add_trigger("", "save_recording", self._recorder.save)
         except DriverError as error:
             self.get_logger().error(str(error))
             self._close()
@@ -386,7 +402,8 @@ class DeviceNode(ParameterNode):
         """Stop the devices."""
         try:
             self.bus.active = False  # for what comes next, also where that takes too long
-            self.stop_devices(lambda: self.bus.set_active(False))
+            self._running_thread.call(lambda: self.bus.set_active(False), STOP_TIME,
+                                      interrupt=True)
         except DriverError as error:
             self.get_logger().warning(f"some may measure until they are told again: {error}")
         return super().on_deactivate(state)
@@ -417,8 +434,8 @@ class DeviceNode(ParameterNode):
         self._bus_error = None
         self._statuses_due = 0.0
         self.undeclare_settings()
-        for destroy in self._entities:
-            destroy()
+        for publisher in self._entities:
+            self.destroy_publisher(publisher)
         self._entities.clear()
 
     def destroy_node(self) -> None:

@@ -14,10 +14,10 @@ import itertools
 import queue
 import threading
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
-from typing import Any, NamedTuple, Protocol, TypeVar, runtime_checkable
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 from driver_common import clocks as time
 from driver_common.errors import DriverError, NoAnswerError, StepInterruptedError
@@ -104,6 +104,47 @@ class _Job(NamedTuple):
     future: Future[Any]
 
 
+class Answer(Generic[T]):
+    """The result of a job in the thread of a bus, for whoever asked for it.
+
+    A coroutine awaits it, and its executor serves others meanwhile; anybody else waits for it.
+    Either raises what the job raises, or NoAnswerError where its turn does not come.
+    """
+
+    def __init__(self, future: Future[T], timeout: float,
+                 on_done: Callable[[], object] = lambda: None) -> None:
+        """Begin to wait.
+
+        Args:
+            future: Takes the result.
+            timeout: Time in s after which it is not waited for any more.
+            on_done: Has the coroutine go on; called in the thread of the bus.
+        """
+        self._future = future
+        self._timeout = timeout
+        self._end = time.monotonic() + timeout
+        future.add_done_callback(lambda _: on_done())
+
+    def wait(self) -> T:
+        """Wait for the result and return it."""
+        try:
+            return self._future.result(self._timeout)
+        except FutureTimeoutError:
+            raise self._given_up() from None
+
+    def __await__(self) -> Generator[Answer[T], None, T]:
+        """Return the result; the executor goes on with it at least as often as it has a timer."""
+        while not self._future.done():
+            if time.monotonic() > self._end:
+                raise self._given_up()
+            yield self
+        return self._future.result()
+
+    def _given_up(self) -> NoAnswerError:
+        self._future.cancel()
+        return NoAnswerError(f"the device was busy for more than {self._timeout:g} s; try again")
+
+
 class DeviceThread(threading.Thread):
     """Opens a bus, polls it, and opens it again after errors, for ever.
 
@@ -129,6 +170,7 @@ class DeviceThread(threading.Thread):
         self._numbers = itertools.count()
         self._stopping = False
         self._may_interrupt = True  # not while it takes leave of the devices
+        self._serving = False  # a user, whose job ends early only where all ends
         self._interrupting = threading.Lock()
         if isinstance(bus, Patient):
             bus.while_waiting(self._run_between)
@@ -144,15 +186,14 @@ class DeviceThread(threading.Thread):
         """
         if threading.current_thread() is self:
             return job()
+        return self.ask(job, timeout, interrupt=interrupt).wait()
+
+    def ask(self, job: Callable[[], T], timeout: float = CALL_TIMEOUT, *,
+            interrupt: bool = False, on_done: Callable[[], object] = lambda: None) -> Answer[T]:
+        """Have `job` run in the thread of the bus and return its answer; see `call`, `Answer`."""
         if self._stopping or not self.is_alive():
             raise NoAnswerError("the link is closed")
-        future = self._put(job, at_once=interrupt)
-        try:
-            return future.result(timeout)
-        except FutureTimeoutError:
-            future.cancel()
-            raise NoAnswerError(f"the device was busy for more than {timeout:g} s; "
-                                "try again") from None
+        return Answer(self._put(job, at_once=interrupt), timeout, on_done)
 
     def post(self, job: Callable[[], Any]) -> None:
         """Have `job` run in the thread of the bus, without waiting for it."""
@@ -210,7 +251,8 @@ class DeviceThread(threading.Thread):
         future: Future[T] = Future()
         self._jobs.put(_Job(0 if at_once else 1, next(self._numbers), job, future))
         with self._interrupting:
-            if at_once and self._may_interrupt and isinstance(self._bus, Interruptible):
+            if (at_once and self._may_interrupt and (self._stopping or not self._serving)
+                    and isinstance(self._bus, Interruptible)):
                 self._bus.interrupt()
         return future
 
@@ -237,12 +279,14 @@ class DeviceThread(threading.Thread):
     def _run_job(self, job: _Job) -> None:
         if not job.future.set_running_or_notify_cancel():
             return
-        if job.order == 0:
-            self._resume()
+        with self._interrupting:
+            self._serving = True
+            self._resume()  # the step that was interrupted is over
         try:
             job.future.set_result(job.run())
         except Exception as error:  # belongs to the caller
             job.future.set_exception(error)
+        self._serving = False
 
 
 def _internal(error: Exception) -> DriverError:

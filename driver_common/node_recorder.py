@@ -142,7 +142,7 @@ class NodeRecorder:
 
     # --- in the executor ---
 
-    def save(self) -> str:
+    async def save(self) -> str:
         """Write the last minute, and return where it is; raises DriverError."""
         if self._node.bus is None:
             raise DriverError("there is nothing to save: the node is not configured")

@@ -10,19 +10,23 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Coroutine, Iterator, Mapping, Sequence
+from typing import Any, TypeVar, cast
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.lifecycle import LifecycleNode
 from rclpy.parameter import Parameter as RosParameter
 
+from driver_common.device_thread import Answer
 from driver_common.errors import DriverError, SettingError
-from driver_common.parameters import ParameterStore, refusal, refuse_unknown_types
+from driver_common.parameters import ParameterStore, answer_sets, refusal
 from driver_common.recording import read_recording
 from driver_common.replay import recording_path
 from driver_common.settings import Option, Setting, Value
+
+T = TypeVar("T")
 
 SENSOR_NAME = re.compile("[a-z][a-z0-9_]*")
 SENSORS = Option(
@@ -56,14 +60,14 @@ class ParameterNode(LifecycleNode):
         super().__init__(name)
         self.bus: Any = None
         self.store = ParameterStore(self)
-        refuse_unknown_types(self)
+        answer_sets(self, self.set_together)
         self._devices: dict[str, Any] = {}  # by the names of the parameters that are its settings
         self._take_recorded_parameters()
         self._declare_options()
 
     # --- what a subclass provides ---
 
-    def call(self, job: Callable[[], Any]) -> Any:
+    async def call(self, job: Callable[[], Any]) -> Any:
         """Run a job in the thread of the bus; raises DriverError."""
         raise NotImplementedError
 
@@ -208,6 +212,14 @@ class ParameterNode(LifecycleNode):
 
     def set_parameters_atomically(
             self, parameter_list: list[RosParameter]) -> SetParametersResult:
+        """Set parameters, see `set_together`, and wait for it; not for callbacks."""
+        return _finished(self.set_together(parameter_list))
+
+    def set_parameters(self, parameter_list: list[RosParameter]) -> list[SetParametersResult]:
+        """Set parameters one by one."""
+        return [self.set_parameters_atomically([parameter]) for parameter in parameter_list]
+
+    async def set_together(self, parameter_list: list[RosParameter]) -> SetParametersResult:
         """Set parameters, all or none; those of a device are written to it and read back."""
         own = [parameter for parameter in parameter_list
                if parameter.name in self.store.rows or not self.has_parameter(parameter.name)]
@@ -220,17 +232,13 @@ class ParameterNode(LifecycleNode):
                 raise SettingError("set the parameters of ROS, such as use_sim_time, separately")
             for parameter in own:
                 self._check_is_there(parameter.name)
-            return self.store.store(self._apply(self.store.check(own)))
+            return self.store.store(await self._apply(self.store.check(own)))
         except DriverError as error:
             return refusal(error)
         except Exception as error:  # an exception here would end the node
             return refusal(DriverError(f"internal error, please report it: {error!r}"))
 
-    def set_parameters(self, parameter_list: list[RosParameter]) -> list[SetParametersResult]:
-        """Set parameters one by one."""
-        return [self.set_parameters_atomically([parameter]) for parameter in parameter_list]
-
-    def _apply(self, values: Mapping[str, Value]) -> dict[str, Value]:
+    async def _apply(self, values: Mapping[str, Value]) -> dict[str, Value]:
         """Write device settings among `values`; return all values as they are then."""
         by_device: dict[Any, dict[str, Value]] = {}
         for name, value in values.items():
@@ -244,21 +252,31 @@ class ParameterNode(LifecycleNode):
         try:
             for device, changes in by_device.items():
                 before = {name: self.get_parameter(name).value for name in changes}
-                result |= self._write(device, changes)
+                result |= await self._write(device, changes)
                 done.append((device, before))
         except DriverError:
             for device, before in reversed(done):
-                self._write(device, before)
+                await self._write(device, before)
             raise
         if len(result) > sum(map(len, by_device.values())):
             self.later(self.apply_options)
-        return result
+        return dict(self._present(result))
 
-    def _write(self, device: Any, changes: Mapping[str, Value]) -> dict[str, Value]:
+    async def _write(self, device: Any, changes: Mapping[str, Value]) -> dict[str, Value]:
+        self.bus.require(device)  # now, and not when the bus had its next look for it
         prefix = self.prefix(device.options.name)
-        reported = self.call(lambda: self.bus.write(
+        reported = await self.call(lambda: self.bus.write(
             device, {name.removeprefix(prefix): value for name, value in changes.items()}))
         return {prefix + name: value for name, value in reported.items()}
+
+    def _present(self, values: Mapping[str, Value]) -> Iterator[tuple[str, Value]]:
+        """Yield what there is to be stored: other sets, or a clean-up, may have come meanwhile."""
+        for name, value in values.items():
+            device = self._devices.get(name)
+            if device is not None:
+                yield name, device.values[name.removeprefix(self.prefix(device.options.name))]
+            elif name in self.store.rows:
+                yield name, value
 
     def _check_is_there(self, name: str) -> None:
         """Say why a device's setting is no parameter now; raises SettingError."""
@@ -281,3 +299,13 @@ class ParameterNode(LifecycleNode):
             raise SettingError(
                 f"{name} cannot change while the node is configured; first run 'ros2 lifecycle "
                 f"set {node} deactivate' and 'ros2 lifecycle set {node} cleanup'")
+
+
+def _finished(coroutine: Coroutine[Answer[Any], None, T]) -> T:
+    """Return the result of a coroutine, which awaits nothing but answers of a bus."""
+    try:
+        while True:
+            with contextlib.suppress(Exception):  # which it raises once more, where it belongs
+                coroutine.send(None).wait()
+    except StopIteration as end:
+        return cast(T, end.value)

@@ -10,8 +10,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from functools import partial
+from collections.abc import Awaitable, Callable, Iterable, Mapping
 from typing import Any
 
 from rcl_interfaces.msg import (
@@ -22,13 +21,14 @@ from rcl_interfaces.msg import (
 )
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
 from driver_common.errors import DriverError, SettingError
 from driver_common.settings import Parameter, Setting, Value, suggestion
 
-SetCallback = Callable[[Any, Any], Any]
+SetTogether = Callable[[list[RosParameter]], Awaitable[SetParametersResult]]
 
 _TYPES = {bool: RosParameter.Type.BOOL, int: RosParameter.Type.INTEGER,
           float: RosParameter.Type.DOUBLE, str: RosParameter.Type.STRING,
@@ -167,29 +167,38 @@ class ParameterStore:
                 for name in self.overrides if name.startswith(prefix) and name not in names]
 
 
-def refuse_unknown_types(node: Node) -> None:
-    """Have the services of a node refuse values of a type that ROS has not; rclpy ends the node."""
-    def set_each(callback: SetCallback, request: SetParameters.Request,
-                 response: SetParameters.Response) -> SetParameters.Response:
+def answer_sets(node: Node, set_together: SetTogether) -> None:
+    """Have the services of a node set parameters with `set_together`, which may take its time.
+
+    The executor serves others meanwhile. Values of a type that ROS has not are refused; rclpy ends
+    the node.
+    """
+    async def set_atomically(parameters: Iterable[ParameterMessage]) -> SetParametersResult:
+        fault = next(filter(None, map(_unknown_type, parameters)), None)
+        if fault is not None:
+            return refusal(fault)
+        return await set_together([RosParameter.from_parameter_msg(parameter)
+                                   for parameter in parameters])
+
+    async def set_each(request: SetParameters.Request,
+                       response: SetParameters.Response) -> SetParameters.Response:
         for parameter in request.parameters:
-            if fault := _unknown_type(parameter):
-                response.results.append(refusal(fault))
-            else:
-                callback(SetParameters.Request(parameters=[parameter]), response)
+            response.results.append(await set_atomically([parameter]))
         return response
 
-    def set_all(callback: SetCallback, request: SetParametersAtomically.Request,
-                response: SetParametersAtomically.Response) -> SetParametersAtomically.Response:
-        fault = next(filter(None, map(_unknown_type, request.parameters)), None)
-        if fault is None:
-            return callback(request, response)
-        response.result = refusal(fault)
+    async def set_all(request: SetParametersAtomically.Request,
+                      response: SetParametersAtomically.Response
+                      ) -> SetParametersAtomically.Response:
+        response.result = await set_atomically(request.parameters)
         return response
 
     handlers = {SetParameters: set_each, SetParametersAtomically: set_all}
+    group = ReentrantCallbackGroup()
     for service in node.services:
         if service.srv_type in handlers:
-            service.callback = partial(handlers[service.srv_type], service.callback)
+            service.callback = handlers[service.srv_type]
+            service.callback_group = group
+            group.add_entity(service)
 
 
 def _unknown_type(parameter: ParameterMessage) -> SettingError | None:

@@ -26,7 +26,7 @@ from std_msgs.msg import Float64, Float64MultiArray
 
 from driver_common import clocks as time
 from driver_common import diagnostics
-from driver_common.device_node import FRAME_ID, TIME_OFFSET, DeviceNode, Topic, run
+from driver_common.device_node import FRAME_ID, TIME_OFFSET, Action, DeviceNode, Topic, run
 from driver_common.recording import CAN
 from driver_common.settings import Option, Value
 from icotronic_driver.commands import parse_request
@@ -229,7 +229,7 @@ class IcotronicNode(DeviceNode, Listener):
         return [self.option(name) for name in STREAM_OPTIONS]
 
     def make_interfaces(self, sensor: str) -> None:
-        """Create topics and services."""
+        """Create the topics."""
         self._topics = {
             "batch": self.add_publisher(sensor, "imu/batch"),
             "vibration": self.add_publisher(sensor, "vibration"),
@@ -239,19 +239,20 @@ class IcotronicNode(DeviceNode, Listener):
                for name in self.TOPICS if name.startswith("channel_")}}
         if self.option("publish_samples"):
             self._topics["imu"] = self.add_publisher(sensor, "imu/data_raw")
-        super().make_interfaces(sensor)
-        for name, action in (
-                ("scan", self._scan),
-                ("reconnect", self._reconnect),
-                ("reset_sth", lambda: self._reset(STH_1)),
-                ("reset_stu", lambda: self._reset(STU_1)),
-                ("read_eeprom", lambda: self._read_eeprom(STH_1)),
-                ("read_stu_eeprom", lambda: self._read_eeprom(STU_1)),
-                ("measure_calibration", self._measure),
-                ("execute_command", self._execute_command),
-                ("preview_save", self._preview_save),
-                ("save_all_settings", self._save)):
-            self.add_trigger(sensor, name, action)
+
+    def services_of(self, sensor: str) -> dict[str, Action]:
+        """Return the services of the sensor and the stationary unit."""
+        return super().services_of(sensor) | {
+            "scan": self._scan,
+            "reconnect": self._reconnect,
+            "reset_sth": partial(self._reset, STH_1),
+            "reset_stu": partial(self._reset, STU_1),
+            "read_eeprom": partial(self._read_eeprom, STH_1),
+            "read_stu_eeprom": partial(self._read_eeprom, STU_1),
+            "measure_calibration": self._measure,
+            "execute_command": self._execute_command,
+            "preview_save": self._preview_save,
+            "save_all_settings": self._save}
 
     def channel(self) -> str:
         """Return the name of the CAN channel."""
@@ -378,22 +379,22 @@ class IcotronicNode(DeviceNode, Listener):
 
     # --- services, in the executor ---
 
-    def _scan(self) -> str:
-        seen = self.call(self.bus.maintenance.scan)
+    async def _scan(self) -> str:
+        seen = await self.call(lambda: self.bus.maintenance.scan())
         note = ("; a connected sensor hides the others"
                 if self.bus.sensor.phase is not Phase.SEARCHING else "")
         return f"{len(seen)} in range: {'; '.join(map(str, seen)) or 'none'}{note}"
 
-    def _reconnect(self) -> str:
-        self.call(self.bus.maintenance.reconnect)
+    async def _reconnect(self) -> str:
+        await self.call(lambda: self.bus.maintenance.reconnect())
         return "disconnected; searching again"
 
-    def _reset(self, node: int) -> str:
-        self.call(lambda: self.bus.maintenance.reset(node))
+    async def _reset(self, node: int) -> str:
+        await self.call(lambda: self.bus.maintenance.reset(node))
         return "reset; the sensor will be connected again"
 
-    def _read_eeprom(self, node: int) -> str:
-        fields = self.call(lambda: self.bus.maintenance.read_eeprom(node))
+    async def _read_eeprom(self, node: int) -> str:
+        fields = await self.call(lambda: self.bus.maintenance.read_eeprom(node))
         lines = []
         for page, name in PAGE_NAMES.items():
             content = [f"  {field.name}: {field.text(value)}"
@@ -402,21 +403,22 @@ class IcotronicNode(DeviceNode, Listener):
                 lines += [f"{name} (page {page})", *content]
         return "\n".join(lines)
 
-    def _measure(self) -> str:
-        results = self.call(self.bus.maintenance.measure)
+    async def _measure(self) -> str:
+        results = await self.call(lambda: self.bus.maintenance.measure())
         return "; ".join(f"{name}: {value:g}" for name, value in results.items())
 
-    def _execute_command(self) -> str:
+    async def _execute_command(self) -> str:
         text, receiver = self.option("command"), RECEIVERS[self.option("command_receiver")]
         request = parse_request(text, receiver)
-        result = self.call(lambda: self.bus.maintenance.execute(request))
+        result = await self.call(lambda: self.bus.maintenance.execute(request))
         return f"{request.name}: {_in_words(result)}"
 
-    def _preview_save(self) -> str:
-        return f"saving would change {_changes(self.call(self.bus.maintenance.unsaved))}"
+    async def _preview_save(self) -> str:
+        changes = await self.call(lambda: self.bus.maintenance.unsaved())
+        return f"saving would change {_changes(changes)}"
 
-    def _save(self) -> str:
-        changes = self.call(self.bus.maintenance.save)
+    async def _save(self) -> str:
+        changes = await self.call(lambda: self.bus.maintenance.save())
         return (f"saved {_changes(changes)} in the sensor's EEPROM" if changes
                 else "the sensor's EEPROM holds all of it already")
 

@@ -52,7 +52,7 @@ class IcotronicBus(DeviceBus[Sensor]):
         self.acquisition = Acquisition(line, sensor, access, listener,
                                        partial(self.wants, sensor))
         self.maintenance = Maintenance(line, sensor, access, self._connection, self.acquisition,
-                                       partial(self._require, sensor), partial(self._lose, sensor))
+                                       partial(self.require, sensor), partial(self._lose, sensor))
         self._told_buffer = False
 
     def close(self) -> None:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from sensor_msgs.msg import PointCloud2, Range, Temperature
 from std_msgs.msg import Bool, Float32MultiArray
 
 from driver_common import diagnostics
-from driver_common.device_node import FRAME_ID, TIME_OFFSET, DeviceNode, Topic, run
+from driver_common.device_node import FRAME_ID, TIME_OFFSET, Action, DeviceNode, Topic, run
 from driver_common.settings import Option, Value
 from isys_radar_driver import commands
 from isys_radar_driver.commands import Command, RangeList
@@ -169,26 +169,26 @@ class IsysRadarNode(DeviceNode, Listener):
                 self._set_live(radar.options)
 
     def make_interfaces(self, sensor: str) -> None:
-        """Create topics and services of a sensor."""
+        """Create the topics of a sensor."""
         self._publishers_of[sensor] = {
             name: self.add_publisher(sensor, name) for name in ("points", "clipping")}
-        super().make_interfaces(sensor)
-        for name, action in (
-                ("preview_save", self._preview_save),
-                ("save_sensor_settings",
-                 lambda radar: self._save(radar, commands.SAVE_SENSOR_SETTINGS)),
-                ("save_application_settings",
-                 lambda radar: self._save(radar, commands.SAVE_APPLICATION_SETTINGS)),
-                ("save_all_settings",
-                 lambda radar: self._save(radar, commands.SAVE_ALL_SETTINGS)),
-                ("restore_factory_settings", self._restore_factory_settings),
-                ("set_default_temperature_thresholds", self._set_default_thresholds),
-                ("change_address", self._change_address),
-                ("read_raw_signals", self._read_raw_signals)):
-            self._add_service(sensor, name, action)
 
-    def _add_service(self, sensor: str, name: str, action: Callable[[Radar], str]) -> None:
-        self.add_trigger(sensor, name, lambda: action(self.device(sensor)))
+    def services_of(self, sensor: str) -> dict[str, Action]:
+        """Return the services of a radar."""
+        def save(command: Command[None]) -> Action:
+            return lambda: self._save(self.device(sensor), command)
+
+        return super().services_of(sensor) | {
+            "preview_save": lambda: self._preview_save(self.device(sensor)),
+            "save_sensor_settings": save(commands.SAVE_SENSOR_SETTINGS),
+            "save_application_settings": save(commands.SAVE_APPLICATION_SETTINGS),
+            "save_all_settings": save(commands.SAVE_ALL_SETTINGS),
+            "restore_factory_settings":
+                lambda: self._restore_factory_settings(self.device(sensor)),
+            "set_default_temperature_thresholds":
+                lambda: self._set_default_thresholds(self.device(sensor)),
+            "change_address": lambda: self._change_address(self.device(sensor)),
+            "read_raw_signals": lambda: self._read_raw_signals(self.device(sensor))}
 
     def add_device_interfaces(self, radar: Radar) -> None:
         """Create the topics that the radar's model can serve."""
@@ -271,8 +271,8 @@ class IsysRadarNode(DeviceNode, Listener):
 
     # --- services, in the executor ---
 
-    def _save(self, radar: Radar, command: Command[None]) -> str:
-        return str(self.call(lambda: self._saved(radar, command)))
+    async def _save(self, radar: Radar, command: Command[None]) -> str:
+        return str(await self.call(lambda: self._saved(radar, command)))
 
     def _saved(self, radar: Radar, command: Command[None]) -> str:
         """Save, and return what was saved; in the thread of the bus, which owns the values."""
@@ -282,8 +282,8 @@ class IsysRadarNode(DeviceNode, Listener):
         saved = f"saved; changed before: {names}" if names else nothing
         return saved + self._not_savable(radar, command)
 
-    def _preview_save(self, radar: Radar) -> str:
-        return str(self.call(lambda: self._preview(radar)))
+    async def _preview_save(self, radar: Radar) -> str:
+        return str(await self.call(lambda: self._preview(radar)))
 
     def _preview(self, radar: Radar) -> str:
         """Return what saving all would change; in the thread of the bus."""
@@ -305,21 +305,21 @@ class IsysRadarNode(DeviceNode, Listener):
         product = radar.product
         return f"; the {product} cannot store {names}: lost at power-off" if names else ""
 
-    def _restore_factory_settings(self, radar: Radar) -> str:
-        self.call(lambda: self.bus.maintenance.restore_factory_settings(radar))
+    async def _restore_factory_settings(self, radar: Radar) -> str:
+        await self.call(lambda: self.bus.maintenance.restore_factory_settings(radar))
         return "factory settings restored, in RAM and EEPROM"
 
-    def _set_default_thresholds(self, radar: Radar) -> str:
-        thresholds = self.call(lambda: self.bus.maintenance.set_default_thresholds(radar))
+    async def _set_default_thresholds(self, radar: Radar) -> str:
+        thresholds = await self.call(lambda: self.bus.maintenance.set_default_thresholds(radar))
         return "temperature thresholds are " + ", ".join(f"{value:g} °C" for value in thresholds)
 
-    def _change_address(self, radar: Radar) -> str:
+    async def _change_address(self, radar: Radar) -> str:
         maintenance = self.bus.maintenance
-        return self.give_address(radar.options.name,
-                                 lambda address: maintenance.change_address(radar, address))
+        return await self.give_address(
+            radar.options.name, lambda address: maintenance.change_address(radar, address))
 
-    def _read_raw_signals(self, radar: Radar) -> str:
-        raw = self.call(lambda: self.bus.maintenance.read_raw_signals(radar))
+    async def _read_raw_signals(self, radar: Radar) -> str:
+        raw = await self.call(lambda: self.bus.maintenance.read_raw_signals(radar))
         self._publish(radar, "raw_signals", to_float32_multi_array(
             raw.samples, ["signal", f"sample, {raw.sample_time:g} s apart"]))
         signals, samples = raw.samples.shape

@@ -74,7 +74,7 @@ class RadarBus(DeviceBus[Radar]):
         self.connection = Connection(self.access, self.devices, self.acquisition, listener,
                                      baud_rate)
         self.maintenance = Maintenance(self.access, self.devices, self.acquisition,
-                                       self.connection, listener, self._require, self._lose)
+                                       self.connection, listener, self.require, self._lose)
 
     def _check_addresses(self) -> None:
         owners: dict[int, str] = {}

@@ -21,7 +21,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from sensor_msgs.msg import Range, Temperature
 
 from driver_common import diagnostics
-from driver_common.device_node import FRAME_ID, TIME_OFFSET, DeviceNode, Topic, run
+from driver_common.device_node import FRAME_ID, TIME_OFFSET, Action, DeviceNode, Topic, run
 from driver_common.settings import Option
 from msg_conversions.range import (
     NO_ECHO_VALUES,
@@ -140,14 +140,16 @@ class Uc4000Node(DeviceNode, Listener):
                 sensor.due = sensor.temperature_due = 0.0  # not after the period of before
 
     def make_interfaces(self, sensor: str) -> None:
-        """Create topics and services of a sensor."""
-        super().make_interfaces(sensor)
+        """Create the topics of a sensor."""
         self._publishers_of[sensor] = {
             "range": self.add_publisher(sensor, "range"),
             "temperature": self.add_publisher(sensor, "temperature")}
-        self.add_trigger(sensor, "identify", lambda: self._identify(self.device(sensor)))
-        self.add_trigger(sensor, "change_address",
-                         lambda: self._change_address(self.device(sensor)))
+
+    def services_of(self, sensor: str) -> dict[str, Action]:
+        """Return the services of a sensor."""
+        return super().services_of(sensor) | {
+            "identify": lambda: self._identify(self.device(sensor)),
+            "change_address": lambda: self._change_address(self.device(sensor))}
 
     # --- what the bus reports, in its thread ---
 
@@ -181,12 +183,12 @@ class Uc4000Node(DeviceNode, Listener):
 
     # --- services, in the executor ---
 
-    def _identify(self, sensor: Sensor) -> str:
-        self.call(lambda: self.bus.maintenance.identify(sensor))
+    async def _identify(self, sensor: Sensor) -> str:
+        await self.call(lambda: self.bus.maintenance.identify(sensor))
         return self.describe(sensor)
 
-    def _change_address(self, sensor: Sensor) -> str:
-        return self.give_address(
+    async def _change_address(self, sensor: Sensor) -> str:
+        return await self.give_address(
             sensor.options.name, partial(self.bus.maintenance.change_address, sensor))
 
     # --- diagnostics ---

@@ -64,7 +64,7 @@ class Uc4000Bus(DeviceBus[Sensor]):
             self.line, self.devices,
             make_groups(groups, [sensor.options.name for sensor in self.devices]), self.wants,
             listener)
-        self.maintenance = Maintenance(self.line, self.devices, self._connection, self._require)
+        self.maintenance = Maintenance(self.line, self.devices, self._connection, self.require)
 
     def _check_addresses(self) -> None:
         addresses = [sensor.options.address for sensor in self.devices]

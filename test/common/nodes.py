@@ -305,14 +305,27 @@ class RemoteNode:
         """As change_state, with the number of the transition."""
         return self._call(ChangeState, "change_state", transition=Transition(id=number)).success
 
+    def begin_set(self, name, value):
+        """Begin to set a parameter and return the future of the response."""
+        return self._begin(SetParameters, "set_parameters", parameters=[
+            Parameter(name, value=value).to_parameter_msg()])
+
+    def begin_change_of_state(self, transition):
+        """Begin a transition and return the future of the response."""
+        return self._begin(ChangeState, "change_state",
+                           transition=Transition(id=TRANSITIONS[transition]))
+
     def _call(self, kind, service, **fields):
+        future = self._begin(kind, service, **fields)
+        self.ros.wait_until(future.done)
+        return future.result()
+
+    def _begin(self, kind, service, **fields):
         if service not in self._clients:
             self._clients[service] = self.ros.node.create_client(kind, f"{self.name}/{service}")
             self._meet()
         self.ros.wait_until(self._clients[service].service_is_ready)
-        future = self._clients[service].call_async(kind.Request(**fields))
-        self.ros.wait_until(future.done)
-        return future.result()
+        return self._clients[service].call_async(kind.Request(**fields))
 
     def _meet(self):
         """Wait until the node knows our newest client; before, its response could get lost.

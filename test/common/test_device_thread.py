@@ -285,25 +285,75 @@ def test_what_cannot_wait_ends_a_step_without_an_error(start):
     assert states.empty()
 
 
-def test_what_cannot_wait_comes_first(start):
+def test_what_cannot_wait_comes_first_but_lets_the_job_of_another_user_end(start):
     bus = InterruptibleBus()
     thread, states = start(bus)
     opened(bus, states)
-    done = []
-    urgent = threading.Thread(target=thread.call, args=(lambda: done.append("urgent"), DEADLINE),
-                              kwargs={"interrupt": True})
+    done, answers = [], []
 
     def job():
-        thread.post(lambda: done.append("usual"))
-        urgent.start()
-        bus.interrupted.wait(DEADLINE)
+        answers.append(thread.ask(lambda: done.append("usual"), DEADLINE))
+        answers.append(thread.ask(lambda: done.append("urgent"), DEADLINE, interrupt=True))
+        done.append("interrupted" if bus.interrupted.is_set() else "whole")
 
     bus.steps.put(0.0)
     thread.call(job, DEADLINE)
-    urgent.join(DEADLINE)
     bus.steps.put(0.0)
-    thread.call(lambda: None, DEADLINE)
-    assert done == ["urgent", "usual"]
+    for answer in answers:
+        answer.wait()
+    assert done == ["whole", "urgent", "usual"]
+
+
+def test_stopping_interrupts_the_job_of_a_user_as_well(start):
+    bus = InterruptibleBus()
+    thread, states = start(bus)
+    opened(bus, states)
+    begun = threading.Event()
+
+    def job():
+        begun.set()
+        if not bus.interrupted.wait(DEADLINE):
+            raise AssertionError("it was left alone")
+        raise StepInterruptedError("interrupted")
+
+    bus.steps.put(0.0)
+    answer = thread.ask(job, DEADLINE)
+    assert begun.wait(DEADLINE)
+    thread.stop()
+    with pytest.raises(StepInterruptedError):
+        answer.wait()
+
+
+def test_an_answer_can_be_awaited(bus, start):
+    thread, states = start(bus)
+    opened(bus, states)
+    done = threading.Event()
+
+    async def ask():
+        return await thread.ask(lambda: 7, DEADLINE, on_done=done.set)
+
+    coroutine = ask()
+    assert coroutine.send(None) is not None  # the bus is in the midst of its step
+    bus.steps.put(FOREVER)
+    assert done.wait(DEADLINE)
+    with pytest.raises(StopIteration) as end:
+        coroutine.send(None)
+    assert end.value.value == 7
+
+
+def test_an_answer_that_does_not_come_is_awaited_no_longer(bus, start):
+    thread, _ = start(bus)
+    done = []
+
+    async def ask():
+        return await thread.ask(lambda: done.append(1), timeout=0.0)
+
+    coroutine = ask()
+    with pytest.raises(NoAnswerError, match="busy for more than 0 s"):
+        list(iter(lambda: coroutine.send(None), None))  # again and again
+    bus.steps.put(FOREVER)
+    assert thread.call(lambda: 2) == 2
+    assert done == []
 
 
 def test_an_interruption_that_comes_too_late_changes_nothing(start):

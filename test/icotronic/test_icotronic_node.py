@@ -771,8 +771,7 @@ def test_the_states_of_the_lifecycle_are_those_of_the_sensor(ros, start, launch)
         assert node.change_state("cleanup")
         assert server.network.stu.connected is None
         ros.wait_until(lambda: not node.names() & SETTINGS.keys())
-        ros.wait_until(lambda: f"{NAME}/scan" not in dict(
-            ros.node.get_service_names_and_types()))
+        assert "the node is not configured" in node.trigger("scan").message
         assert node.set("frame_id", "spindle").successful
     process.stop()
 
