@@ -178,8 +178,8 @@ class CanLink:
             cause = cause.__cause__ or cause.__context__
         if self.interface not in can.VALID_INTERFACES:
             known = sorted(can.VALID_INTERFACES)
-            return (f"python-can has no such interface{suggestion(self.interface, known)} "
-                    f"(it has {', '.join(known)})")
+            return (f"python-can has no such interface{suggestion(self.interface, known)}; "
+                    f"can_interface can be {', '.join(known)}")
         if isinstance(error, can.CanInterfaceNotImplementedError):
             return _lacking(str(error))
         if "buffer full" in str(error):

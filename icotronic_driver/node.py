@@ -100,7 +100,7 @@ class IcotronicNode(DeviceNode, Listener):
     )
     SENSOR_OPTIONS = (
         Option("sensor_name", kind=str, default="", description="The sensor with this name"),
-        Option("sensor_mac", kind=str, default="",
+        Option("sensor_mac", kind=str, default="", pattern="(?i)|([0-9a-f]{2}[:-]){5}[0-9a-f]{2}",
                description="The sensor with this MAC address, such as 08:6B:D7:01:DE:81"),
         Option("sensor_number", kind=int, default=-1, minimum=-1, maximum=254,
                description="The sensor with this number at the stationary unit; -1 = any"),

@@ -949,7 +949,7 @@ def test_a_wrong_parameter_ends_the_start_with_the_reason(launch):
         ({"channels": "w"}, "channels must be one of x, y, z, xy, xz, yz, xyz, not 'w'"),
         ({"sample_rate": -5.0}, "sample_rate = -5 Hz is out of range, allowed is 0 … "),
         ({"axis.y": "-w"}, "axis.y must be one of"),
-        ({"sensor_mac": "hello"}, '"hello" is not a MAC address such as 08:6B:D7:01:DE:81'),
+        ({"sensor_mac": "hello"}, "sensor_mac cannot be 'hello': The sensor with this MAC address"),
         ({"config_mode": "pull"}, "config_mode must be one of push, check, leave"),
         ({"can_bitrate": "fast"}, "can_bitrate must be a whole number"))]
     for process, words in cases:
