@@ -361,7 +361,7 @@ def test_an_interface_that_python_can_does_not_have_is_named_with_the_nearest():
         open_link("soketcan")
     assert str(caught.value).startswith(
         'cannot open soketcan can0: python-can has no such interface; did you mean "socketcan')
-    assert "(it has " in str(caught.value)
+    assert "can_interface can be " in str(caught.value)
     assert "socketcand" in str(caught.value)
 
 
