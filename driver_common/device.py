@@ -81,7 +81,8 @@ class Device:
         unsaved: Settings that this driver changed and that were not saved since.
         enabled: Whether it is to measure, as far as the user of the services says.
         error: What is wrong with it; why it is not connected.
-        told: What was wrong before, with the monotonic time in s when it was last so.
+        complained: Whether the user was told of what is wrong with it though it is connected.
+        told: What was wrong before, with the monotonic time in s when it was last so or told.
         misses: Number of steps without a good answer.
         connections: How often it was found.
         backoff: Pauses between attempts to find it.
@@ -100,6 +101,7 @@ class Device:
         self.unsaved: set[str] = set()
         self.enabled = True
         self.error: DriverError | None = None
+        self.complained = False
         self.told: dict[str, float] = {}
         self.misses = 0
         self.connections = 0
@@ -124,6 +126,7 @@ class Device:
     def forget(self) -> None:
         """Take note that it is not connected any more."""
         self.misses = 0
+        self.complained = False
 
     @property
     def differences(self) -> dict[str, str]:

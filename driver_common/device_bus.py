@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import re
 from collections.abc import Iterable, Iterator
 from functools import partial
 from typing import Generic, TypeVar
@@ -32,6 +33,7 @@ DeviceT = TypeVar("DeviceT", bound=Device)
 
 MISSES_UNTIL_LOST = 3
 NEWS_TIME = 60.0  # s in which a reason is told once, though others come between
+CHANGING = re.compile(r"(?<![\w:])[0-9A-F]{2}( [0-9A-F]{2})*(?![\w:])|-?\d+ dBm")  # bytes, RSSI
 
 
 class Listener(Generic[DeviceT]):
@@ -87,10 +89,6 @@ class DeviceBus(Generic[DeviceT]):
     def _explained(self, device: DeviceT, error: DriverError) -> DriverError:
         """Add what can be found out about the reason why a device was not found."""
         return error
-
-    def _gist(self, error: DriverError | None) -> str:
-        """Return what of an error is news."""
-        return str(error)
 
     # --- what the thread of the bus calls ---
 
@@ -172,9 +170,21 @@ class DeviceBus(Generic[DeviceT]):
         """Take note that a device does what it should."""
         device.misses = 0
         device.backoff.reset()
-        if device.error is not None:
-            device.error = None
+        device.error = None
+        if device.complained:
+            device.complained = False
             self._listener.on_note(device, "is well again")
+
+    def _complain(self, device: DeviceT, error: DriverError) -> None:
+        """Take note of what is wrong with a connected device; each reason is told once a minute."""
+        now, gist = time.monotonic(), _gist(error)
+        if gist != _gist(device.error):
+            device.complained = False
+        if not device.complained and now - device.told.get(gist, -math.inf) > NEWS_TIME:
+            device.complained = True
+            device.told[gist] = now
+            self._listener.on_note(device, f"{error}; it is asked again", warning=True)
+        device.error = error
 
     def _note_miss(self, device: DeviceT, error: DriverError) -> None:
         """Ask a device again that did not answer; raises the error after too many times."""
@@ -186,7 +196,7 @@ class DeviceBus(Generic[DeviceT]):
     def _lose(self, device: DeviceT, error: DriverError) -> None:
         """Note that a device is not there; it is looked for more and more rarely."""
         news = device.is_connected or self._is_news(device, error)
-        device.told[self._gist(error)] = time.monotonic()
+        device.told[_gist(error)] = time.monotonic()
         device.forget()
         device.error = error
         device.due = time.monotonic() + self._pause(device)
@@ -195,8 +205,8 @@ class DeviceBus(Generic[DeviceT]):
 
     def _is_news(self, device: DeviceT, error: DriverError) -> bool:
         """Whether the reason is another one, and none that was told lately: some take turns."""
-        gist = self._gist(error)
-        return (gist != self._gist(device.error)
+        gist = _gist(error)
+        return (gist != _gist(device.error)
                 and time.monotonic() - device.told.get(gist, -math.inf) > NEWS_TIME)
 
     def _pause(self, device: DeviceT) -> float:
@@ -224,3 +234,8 @@ class DeviceBus(Generic[DeviceT]):
         except LinkError as error:
             self.link_error = error
             raise
+
+
+def _gist(error: DriverError | None) -> str:
+    """Return an error without what changes at every look."""
+    return CHANGING.sub("", str(error))

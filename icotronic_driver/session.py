@@ -15,7 +15,6 @@ runs in one thread (see `driver_common.device_thread`), but for `interrupt`.
 from __future__ import annotations
 
 import contextlib
-import re
 from collections.abc import Mapping
 from functools import partial
 
@@ -107,7 +106,3 @@ class IcotronicBus(DeviceBus[Sensor]):
             self._connection.begin()
         sensor.time_outs += isinstance(error, NoAnswerError)
         super()._lose(sensor, error)
-
-    def _gist(self, error: DriverError | None) -> str:
-        """Return an error without what changes at every look."""
-        return re.sub(r"-?\d+ dBm", "", str(error))

@@ -166,9 +166,7 @@ class RadarBus(DeviceBus[Radar]):
         if radar.refused == 1:
             self.connection.configure_again(radar, "it refuses to measure, as after a reset")
             return
-        if str(radar.error) != str(error):
-            self._listener.on_note(radar, f"{error}; it is asked again", warning=True)
-        radar.error = error
+        self._complain(radar, error)
         radar.measuring = None  # so that it is started again
         radar.due = time.monotonic() + self._pause(radar)
 

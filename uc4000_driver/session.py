@@ -145,7 +145,5 @@ class Uc4000Bus(DeviceBus[Sensor]):
 
     def _note_refusal(self, sensor: Sensor, error: RefusedError) -> None:
         """Ask a sensor that refuses ever more rarely."""
-        if str(sensor.error) != str(error):
-            self._listener.on_note(sensor, f"{error}; it is asked again", warning=True)
-        sensor.error = error
+        self._complain(sensor, error)
         sensor.due = time.monotonic() + self._pause(sensor)

@@ -357,6 +357,8 @@ TROUBLES = {
     "nothing answers": lambda link, second: setattr(link.radars[0], "silent", True),
     "it goes and comes": lambda link, second: setattr(link.radars[0], "silent", second % 20 > 9),
     "it refuses everything": lambda link, second: setattr(link.radars[0], "refuse", EVERYTHING),
+    "it refuses now and then": lambda link, second: setattr(
+        link.radars[0], "refuse", EVERYTHING if second % 2 > 1 else set()),
     "a stuck transmitter": lambda link, second: setattr(link, "noise", b"\x55" * 64),
     "a bad line": lambda link, second: setattr(link.faults, "damage", 0.01),
     "a line that hardly works": lambda link, second: setattr(link.faults, "damage", 0.1),
