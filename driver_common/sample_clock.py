@@ -126,11 +126,14 @@ class Stamps:
 
     def at(self, number: int) -> float:
         """Return the time of a sample."""
-        if number > self.knot or not self._past:
-            return self.time + (number - self.knot) * self.period
-        knot, there, period = next((piece for piece in reversed(self._past) if number > piece[0]),
-                                   self._past[0])
+        knot, there, period = self.piece(number)
         return there + (number - knot) * period
+
+    def piece(self, number: int) -> tuple[int, float, float]:
+        """Return the piece on which a sample lies: what is in front of it, when, and the period."""
+        if number > self.knot or not self._past:
+            return self.knot, self.time, self.period
+        return next((piece for piece in reversed(self._past) if number > piece[0]), self._past[0])
 
     def lay(self, knot: int, there: float, period: float) -> None:
         """Go on from a time behind a sample."""
@@ -224,8 +227,12 @@ class SampleClock:
 
     @property
     def period(self) -> float:
-        """Time between two samples in ns as they are stamped."""
+        """Time between two samples in ns as the newest are stamped."""
         return self._stamps.period
+
+    def period_at(self, number: int) -> float:
+        """Return the time in ns from the sample in front of a sample to it, as they are stamped."""
+        return self._stamps.piece(number)[2]
 
     @property
     def drift(self) -> float:

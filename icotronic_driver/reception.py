@@ -48,7 +48,8 @@ class Reception:
         self._publish = publish
         self._kernel_stamps = kernel_stamps
         self._order = FrameOrder(decoder)
-        self._held: deque[tuple[int, tuple[int, ...]]] = deque()
+        self._unsettled: list[tuple[int, tuple[int, ...]]] = []  # what waits for a good time
+        self._held: deque[tuple[int, float, tuple[int, ...]]] = deque()  # and for its turn
         self._correction = int(clock.nominal_period * CORRECTION)
 
     def handler(self) -> StreamHandler:
@@ -70,6 +71,7 @@ class Reception:
         for frame in self._order.rest():
             self._take(*frame)
         self._clock.settle()
+        self._stamp()
         self._release(len(self._held))
 
     def _take(self, data: bytes | bytearray, bus_time: float, now: int) -> None:
@@ -83,16 +85,22 @@ class Reception:
                      host_clock.when(bus_time, now) if self._kernel_stamps else now)
         if host_clock.rest:
             host_clock.slew(self._correction)
-        if clock.settled and not self._held:
+        if clock.settled and not self._held and not self._unsettled:
             self._publish(clock.time_of(number) + host_clock.offset, clock.period, values)
             return
-        self._held.append((number, values))
+        self._unsettled.append((number, values))
         if clock.settled:
+            self._stamp()
             self._release(AT_ONCE)
+
+    def _stamp(self) -> None:
+        """Give what waited its time, before the clock turns to what comes next."""
+        clock, offset = self._clock, self._host_clock.offset
+        self._held += [(clock.time_of(number) + offset, clock.period_at(number), values)
+                       for number, values in self._unsettled]
+        self._unsettled.clear()
 
     def _release(self, most: int) -> None:
         """Hand over what is held, but no more frames than a subscriber's queue has room for."""
-        clock, offset, held = self._clock, self._host_clock.offset, self._held
-        for _ in range(min(most, len(held))):
-            number, values = held.popleft()
-            self._publish(clock.time_of(number) + offset, clock.period, values)
+        for _ in range(min(most, len(self._held))):
+            self._publish(*self._held.popleft())

@@ -77,6 +77,20 @@ def test_what_is_held_is_handed_over_at_the_end():
     assert np.diff(receiver.stamps).min() > 0
 
 
+def test_what_is_held_keeps_its_pace_though_a_frame_comes_early():
+    receiver, number, late = Receiver(), 0, 30e6
+    while not receiver.numbers:
+        receiver.receive(number, sent(number) + late, sent(number) + late)
+        number += 1
+    held = number
+    while len(receiver.numbers) < held:  # all have been late until now
+        receiver.receive(number, sent(number), sent(number))
+        number += 1
+    steps = np.diff(np.reshape(receiver.stamps, (-1, 3))[:held - 1].ravel()) / (FRAME_TIME / 3)
+    assert np.abs(steps - 1).max() < 0.011
+    assert np.diff(receiver.stamps).min() > 0
+
+
 def test_a_stream_that_brought_nothing_ends_as_well():
     receiver = Receiver()
     receiver.reception.finish()
