@@ -85,6 +85,21 @@ def test_all_of_them_in_one_view():
     assert shown >= {topic.name for family in FAMILIES for topic in family.topics}
 
 
+def test_all_sensors_of_the_machine_in_one_view():
+    shown = [display["Topic"]["Value"] for display in manager("machine")["Displays"]
+             if "Topic" in display]
+    wires = [("isys_radar", "isys_radars", "points"), ("uc4000", "uc4000_sensors", "range")]
+    wanted = [f"/{node}/{sensor}/{topic}" for node, file, topic in wires for sensor in
+              yaml.safe_load((ROOT / "config" / f"{file}_on_one_line.yaml").read_text())
+              ["/**"]["ros__parameters"]["sensors"]]
+    assert sorted(shown) == sorted([*wanted, "/icotronic/imu/data_raw"])
+    plain = {display["Class"]: display for display in manager("sensors")["Displays"]}
+    for display in manager("machine")["Displays"]:  # all the rest is as for one of each
+        like = plain[display["Class"]]
+        assert display.keys() == like.keys()
+        assert all(display[key] == like[key] for key in display.keys() - {"Name", "Topic"})
+
+
 def test_samples_as_points_are_what_the_stock_rviz_can_show():
     fields = {field.name: field.datatype for field in imu_batch.FIELDS}
     assert tuple(fields) == CLOUDS["/icotronic/imu/batch"]
