@@ -16,8 +16,9 @@ gets the answer that it got at all other times, or none, but never one to someth
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterator, Mapping
+from collections import defaultdict, deque
+from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 
 from driver_common import clocks
@@ -182,24 +183,28 @@ class Replay(FlightRecorder):
             return
         self._silent = True
         self._borrowed.clear()
-        answers = [answer for answer in self._answers(content) if len(answer) > 1]
-        if len({b"".join(entry.content for entry in rest) for _, *rest in answers}) == 1:
-            request, *rest = answers[0]
+        if content in self._answers:
+            request, *rest = self._answers[content]
             later = self.clock.now - request.time
             self._borrowed += [entry._replace(time=entry.time + later) for entry in rest]
 
-    def _answers(self, content: bytes) -> Iterator[list[Entry]]:
-        """Return each place where a request was made: the request, and what came then."""
+    @cached_property
+    def _answers(self) -> Mapping[bytes, Sequence[Entry]]:
+        """Requests that always got the same answer, each with what came at its first place."""
+        places: dict[bytes, list[list[Entry]]] = defaultdict(list)
         found: list[Entry] = []
         for entry in self._entries:
-            if entry.kind in (Kind.SENT, Kind.LOST, Kind.GAP):
-                if found:
-                    yield found
-                found = [entry] if entry.kind is Kind.SENT and entry.content == content else []
+            if entry.kind is Kind.SENT:
+                found = [entry]
+                places[entry.content].append(found)
+            elif entry.kind in (Kind.LOST, Kind.GAP):
+                found = []
             elif found and entry.kind is Kind.RECEIVED:
                 found.append(entry)
-        if found:
-            yield found
+        answered = {content: [place for place in all_ if len(place) > 1]
+                    for content, all_ in places.items()}
+        return {content: some[0] for content, some in answered.items()
+                if len({b"".join(entry.content for entry in rest) for _, *rest in some}) == 1}
 
     def _borrow(self, end: int) -> Entry | None:
         """Return what belongs to the answer of another time, None where nothing does until then."""

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import pytest
+from operations import calls
 
 from driver_common import clocks, device_bus, flight_recorder
 from driver_common.device_thread import DeviceThread
@@ -289,6 +290,15 @@ def test_a_request_that_was_never_made_gets_no_answer(serial):
     assert recorder.differs == "03"
     assert ask(link, ONE) == A  # and all goes on
     assert ask(link, TWO) == B
+
+
+def test_requests_of_another_time_cost_the_same_in_a_long_recording(serial):
+    def cost(count):
+        link, _ = serial(at(1, Kind.OPENED), *[
+            entry for second in range(count) for entry in exchange(1000 + second, ONE, A)])
+        return calls(lambda: [ask(link, ONE) for _ in range(count)])
+
+    assert cost(400) < 2.5 * cost(200)
 
 
 def test_nothing_comes_for_a_request_that_is_not_made(serial):
