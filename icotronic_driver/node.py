@@ -471,6 +471,7 @@ class IcotronicNode(DeviceNode, Listener):
             return diagnostics.ERROR, str(sensor.error or sensor.phase.value)
         complaints = self._complaints(sensor)
         if complaints:
+            complaints += ["acquisition stopped"] if sensor.decoder is None else []
             overload = sensor.overloads(self.option("can_bitrate"))
             return (diagnostics.ERROR if overload else diagnostics.WARN), "; ".join(complaints)
         if sensor.decoder is None:

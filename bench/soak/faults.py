@@ -56,7 +56,7 @@ class Fault:
 ANY = (
     Fault("suspended subscriber", ("reader start", "reader suspend"), ("reader end",)),
     Fault("deactivated", ("client deactivate",), ("client activate",),
-          ("OK acquisition stopped",)),
+          ("OK acquisition stopped", "WARN acquisition stopped")),
     Fault("cleaned up", ("client deactivate", "client cleanup"),
           ("client configure", "client activate"), ("STALE not configured",), 12.0),
     Fault("transitions in a wrong order", (
