@@ -72,7 +72,11 @@ def close_to(*accelerations):
 
 
 class Samples:
-    """A subscriber that keeps up with every rate: it takes bytes, without an executor."""
+    """A subscriber that keeps up with every rate: it takes bytes, without an executor.
+
+    A busy machine may hold it up for longer than the publisher's queue lasts. The middleware numbers
+    what is published, so a test can judge the node by the numbers and the machine by nothing.
+    """
 
     def __init__(self, ros, kind=Imu, topic=f"{NAME}/imu/data_raw"):
         self._node = rclpy.create_node("recorder", context=ros.node.context)
@@ -80,9 +84,20 @@ class Samples:
         self._subscription = self._node.create_subscription(
             kind, topic, lambda message: None, QoSProfile(depth=50_000), raw=True)
         self.messages = []
+        self.numbers = []
 
     def close(self):
         self._node.destroy_node()
+
+    @property
+    def published(self):
+        """How many messages were published until the last one that came."""
+        return self.numbers[-1] if self.numbers else 0
+
+    @property
+    def indices(self):
+        """Which of the published messages came, from 0."""
+        return np.array(self.numbers) - 1
 
     def is_matched(self):
         return self._node.count_publishers(self._topic) > 0
@@ -93,12 +108,13 @@ class Samples:
             while (taken := self._subscription.handle.take_message(
                     self._kind, True)) is not None:
                 self.messages.append(taken[0])
+                self.numbers.append(taken[1]["publication_sequence_number"])
 
     def until(self, count):
-        """Take messages until there are that many."""
+        """Take messages until that many were published."""
         deadline = time.monotonic() + DEADLINE
-        while len(self.messages) < count:
-            assert time.monotonic() < deadline, f"{len(self.messages)} of {count} messages came"
+        while self.published < count:
+            assert time.monotonic() < deadline, f"{self.published} of {count} messages came"
             self.take()
             time.sleep(0.002)
 
@@ -579,9 +595,9 @@ def test_every_sample_arrives_with_its_value_and_its_time(ros, start, launch, sa
     samples.take()
     process.stop()
 
-    assert len(samples.messages) == 3 * frames
+    assert samples.published == 3 * frames
     stamps, accelerations = samples.table()
-    times = times[:len(stamps)]
+    times = times[samples.indices]
     truth = simulated.vibration(times) * STANDARD_GRAVITY
     truth[:, 1:] = 0.0
     assert np.abs(accelerations - truth).max() < STEP
@@ -589,7 +605,7 @@ def test_every_sample_arrives_with_its_value_and_its_time(ros, start, launch, sa
     assert deserialize_message(samples.messages[-1], Imu).header.frame_id == "imu_link"
     settled = times > times[0] + 3.2
     assert np.abs(stamps * 1e-9 - times)[settled].min() < 5e-3  # all of them: test_sample_clock
-    steps = np.diff(stamps[settled]) * 1e-9 * RATE
+    steps = np.diff(stamps[settled]) / np.diff(samples.indices[settled]) * 1e-9 * RATE
     assert np.median(steps) == pytest.approx(1.0, rel=0.02)
 
 
@@ -605,14 +621,14 @@ def test_a_batch_holds_exactly_the_samples_that_are_published_one_by_one(
         ros, start, launch, samples, batches, tmp_path):
     server = start()
     process = launch(at(server, autostart=False, channels="xz", linear_acceleration_stddev=0.5,
-                        **{"axis.z": "-y"}))
+                        sample_rate=1000.0, **{"axis.z": "-y"}))
     node = ros.remote(NAME)
     assert node.change_state("configure")
     process.wait_for_line("connected to")
     ros.wait_until(lambda: samples.is_matched() and batches.is_matched())
-    server.network.faults.loss = 0.01
+    server.network.faults.loss = 0.03
     assert node.change_state("activate")
-    samples.until(10_000)
+    samples.until(1000)  # no more than the publisher keeps: none gets lost, however slow the machine
     assert node.change_state("deactivate")
     status = ros.wait_for_status(
         STATUS, lambda status: int(status.values.get("frames", -1)) == server.network.streamed)
@@ -712,7 +728,7 @@ def test_stamps_increase_and_no_sample_is_invented_on_a_bad_radio(ros, start, la
     frames = int(status.values["frames"])
     samples.until(3 * frames)
     samples.take()
-    assert len(samples.messages) == 3 * frames
+    assert samples.published == 3 * frames
     assert np.diff(samples.table()[0]).min() > 0
     process.stop()
 
