@@ -76,5 +76,5 @@ def _decode(module: str, *arguments: object, core: int | None,
     with Process(module, *arguments, core=core, environment=environment) as client:
         seconds, frames, lost = client.line().split()
         if int(lost):
-            raise client.failure(f"lost {lost} frames")
+            raise client.failure(f"lost something, {lost} frames")
         return Cost(float(seconds) / int(frames) * 1e6, int(frames))

@@ -375,7 +375,7 @@ class DeviceNode(ParameterNode):
             for sensor in self.sensors:
                 self.make_interfaces(sensor)
         except DriverError as error:
-            self.get_logger().error(str(error))
+            self.log_failure(str(error))
             self._close()
             return TransitionCallbackReturn.FAILURE
         self.bus = bus

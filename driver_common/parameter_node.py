@@ -167,13 +167,17 @@ class ParameterNode(LifecycleNode):
                 job()
             except DriverError as error:
                 if self.bus is not None:
-                    self.get_logger().error(str(error))
+                    self.log_failure(str(error))
             except Exception as error:  # an exception here would end the node
-                if self.context.ok():  # else it was shut down meanwhile
-                    self.get_logger().error(f"internal error, please report it: {error!r}")
+                self.log_failure(f"internal error, please report it: {error!r}")
 
         if self.executor is not None:
             self.executor.create_task(guarded)
+
+    def log_failure(self, text: str) -> None:
+        """Log an error, but not what fails because the context was shut down meanwhile."""
+        if self.context.ok():
+            self.get_logger().error(text)
 
     # --- settings of the devices ---
 

@@ -154,6 +154,7 @@ class SimulatedLine:
         self._arrived_until = self._last_arrival = 0.0
         self._busy: list[tuple[float, float]] = []  # when the line is taken, from … until
         self._wake_reader, self._wake_writer = os.pipe()
+        self._works = False
         self._babbled_until = time.monotonic()
         self._transport: _Tcp | _Pty | None = None
         self._thread: threading.Thread | None = None
@@ -190,6 +191,17 @@ class SimulatedLine:
             self._open()
             self.start()
 
+    @property
+    def is_behind(self) -> bool:
+        """Whether something is due that the machine holds up; from any thread."""
+        transport, thread = self._transport, self._thread
+        if transport is None or thread is None or not thread.is_alive():
+            return False
+        with contextlib.suppress(OSError, ValueError):  # unplugged meanwhile
+            return (bool(select.select(transport.readers(), [], [], 0)[0]) or self._works
+                    or any(due <= time.monotonic() for due, _, _ in self._due[:1]))
+        return False
+
     def hang(self) -> None:
         """Forget the client without a word, as a server that lost its power; TCP only."""
         os.write(self._wake_writer, _HANG)
@@ -211,8 +223,10 @@ class SimulatedLine:
         while True:
             due = self._due[0][0] - time.monotonic() if self._due else IDLE_TIME
             pause = CHUNK_TIME if self.faults.babble else IDLE_TIME
+            self._works = False
             ready, _, _ = select.select([self._wake_reader, *transport.readers()], [], [],
                                         min(max(due, 0.0), pause))
+            self._works = True  # before anything is taken that shows that there is work
             if self._wake_reader in ready:
                 if os.read(self._wake_reader, 1) == _STOP:
                     return

@@ -74,8 +74,9 @@ def close_to(*accelerations):
 class Samples:
     """A subscriber that keeps up with every rate: it takes bytes, without an executor.
 
-    A busy machine may hold it up for longer than the publisher's queue lasts. The middleware numbers
-    what is published, so a test can judge the node by the numbers and the machine by nothing.
+    A busy machine may hold it up for longer than the publisher's queue lasts. The middleware
+    numbers what is published, so a test can judge the node by the numbers and the machine by
+    nothing.
     """
 
     def __init__(self, ros, kind=Imu, topic=f"{NAME}/imu/data_raw"):
@@ -628,7 +629,7 @@ def test_a_batch_holds_exactly_the_samples_that_are_published_one_by_one(
     ros.wait_until(lambda: samples.is_matched() and batches.is_matched())
     server.network.faults.loss = 0.03
     assert node.change_state("activate")
-    samples.until(1000)  # no more than the publisher keeps: none gets lost, however slow the machine
+    samples.until(1000)  # no more than the publisher keeps, so none gets lost
     assert node.change_state("deactivate")
     status = ros.wait_for_status(
         STATUS, lambda status: int(status.values.get("frames", -1)) == server.network.streamed)
