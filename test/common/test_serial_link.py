@@ -18,6 +18,7 @@ import time
 import tty
 
 import pytest
+from bus_master import wait_until
 from rfc2217_server import Rfc2217Server
 
 from driver_common import serial_link
@@ -261,6 +262,24 @@ def test_a_simulated_line_answers_at_its_baud_rate_alone():
     assert device.heard[-1] != b"abc"
     link.close()
     line.close()
+
+
+def test_no_wait_for_a_simulated_line_ends_while_the_machine_holds_it_up():
+    class HeldUp(Device):
+        def receive(self, data, now):
+            time.sleep(0.3)
+            return super().receive(data, now)
+
+    line = SimulatedLine(HeldUp()).start()
+    link = SerialLink(line.port, 115200)
+    link.write(b"a")
+    assert link.read(0.05) == b"a"
+    wait_until(lambda: not line.is_behind)
+    assert link.read(0.05) == b""
+    link.close()
+    assert not line.is_behind
+    line.close()
+    assert not line.is_behind
 
 
 def test_a_simulated_line_that_was_closed_leaves_later_ones_alone(tmp_path):
