@@ -995,7 +995,8 @@ def test_a_node_started_with_the_parameters_it_had_has_nothing_to_tell(
     process.wait_for_line("connected to")
     here.ros.wait_until(lambda: here.radar.measuring)
     process.stop()
-    assert len(process.lines) == 1
+    of_the_link = ("connected to", "(waiting for it)")  # a busy machine may be too late
+    assert not [line for line in process.lines if not any(map(line.__contains__, of_the_link))]
 
 
 def test_parameters_can_be_given_as_in_the_example_file(station, tmp_path):
