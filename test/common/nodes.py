@@ -32,6 +32,7 @@ from typing import NamedTuple
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
+from forked import Forked
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.srv import (
@@ -67,16 +68,17 @@ class Process:
         before: Code to run before.
         within: Command that runs the program elsewhere, such as in a network namespace.
         env: What its environment has beside that of the test.
+        forked: Whether it starts without importing; see `Forked`.
     """
 
-    def __init__(self, module, *arguments, before="", within=(), env=None):
+    def __init__(self, module, *arguments, before="", within=(), env=None, forked=False):
         self.lines = []
         self._news = threading.Condition()
-        self._process = subprocess.Popen(
-            [*within, sys.executable, "-c",
-             f"{END_WITH_PARENT}\n{before}\nfrom {module} import main; main()", *arguments],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-            env={**os.environ, "PYTHONUNBUFFERED": "1", **(env or {})})
+        code = f"{END_WITH_PARENT}\n{before}\nfrom {module} import main; main()"
+        env = {**os.environ, "PYTHONUNBUFFERED": "1", **(env or {})}
+        self._process = Forked(code, arguments, env) if forked else subprocess.Popen(
+            [*within, sys.executable, "-c", code, *arguments], env=env, text=True,
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
         self._reader = threading.Thread(target=self._read)
         self._reader.start()
 
@@ -150,6 +152,8 @@ class Process:
 class NodeProcess(Process):
     """A node that runs as its user would run it, but for diagnostics that come more often.
 
+    It is forked, as far as it runs here.
+
     Args:
         module: Module whose `main` runs the node.
         parameters: Values for `-p`.
@@ -160,7 +164,8 @@ class NodeProcess(Process):
     def __init__(self, module, parameters=None, *arguments, **how):
         for name, value in (parameters or {}).items():
             arguments += "-p", f"{name}:={json.dumps(value)}"
-        super().__init__(module, "--ros-args", *arguments, before=OFTEN, **how)
+        super().__init__(module, "--ros-args", *arguments, before=OFTEN,
+                         forked="within" not in how, **how)
 
 
 class Status(NamedTuple):

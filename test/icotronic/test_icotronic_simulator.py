@@ -753,6 +753,8 @@ def test_a_slow_client_holds_up_nobody(bus: can.BusABC, server: SimulatedIcotron
         _ask(bus, commands.WRITE_ADC.request(STH, AdcConfiguration(1, 1, 8)))
         _ask(bus, commands.START_ACCELERATION.request(STH, StreamFormat(X, 3)))
         _until(bus, lambda _: server.dropped > 0)
+        # This client may be slow as well, but is to hear the answer.
+        monkeypatch.setattr(simulated_bus, "MAX_WAITING", sys.maxsize)
         _ask(bus, commands.STOP_ACCELERATION.request(STH))
     _ask(bus, commands.READ_STATE.request(STU))
 
