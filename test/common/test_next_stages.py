@@ -98,7 +98,7 @@ def test_no_analyzer_takes_those_of_others(analyzers):
 @pytest.mark.parametrize(("node", "parameters", "sensor"), [
     ("isys_radar", {"serial_port": "sim://iSYS-4001"}, "radar"),
     ("uc4000", {"serial_port": "sim://UC4000"}, "sensor"),
-    ("icotronic", {"can_interface": "sim"}, "sensor")])
+    ("icotronic", {"can_interface": "sim", "sample_rate": 1000.0}, "sensor")])
 def test_a_running_node_has_a_status_that_its_analyzer_takes(analyzers, node, parameters, sensor):
     analyzer = analyzers[node]
 

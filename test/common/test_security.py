@@ -81,6 +81,7 @@ def test_a_policy_allows_what_its_node_does_and_no_more(name):
         with Ros() as ros, NodeProcess(NODES[name][0], {parameter: device}):
             remote = ros.remote(f"/{name}")
             ros.wait_until(lambda remote=remote: remote.state() == "active")
+            ros.wait_until(lambda ros=ros: name in ros.node.get_node_names())
             ros.wait(lambda seen=seen, ros=ros: _add(seen, graph(ros, name)) == list(policy), 20.0
                      if device == devices[-1] else 5.0)
     assert seen == list(policy)

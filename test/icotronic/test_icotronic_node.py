@@ -765,7 +765,7 @@ def test_the_states_of_the_lifecycle_are_those_of_the_sensor(ros, start, launch)
                         **{"adc.oversampling_rate": 1024}))
     node = ros.remote(NAME)
     assert node.state() == "unconfigured"
-    assert ros.wait_for_status(STATUS).message == "not configured"
+    ros.wait_for_status(STATUS, lambda status: status.message == "not configured")
     assert node.names() & SETTINGS.keys() == set()
 
     for _ in range(2):

@@ -43,7 +43,7 @@ def test_damage_costs_one_cycle(master, capsys, rate, least):
     heard, link, reply = master.heard, master.link, sent_as(master.heard.lists[-1][1])
     heard.lists.clear()
     link.faults.damage = rate
-    begin, seconds = EPOCH + link.clock.now, 600.0
+    begin, seconds = EPOCH + link.clock.now, 200.0
     master.run(seconds)
     times = [begin, *(stamp * 1e-9 for _, _, stamp in heard.lists)]
     gap = max(later - before for before, later in itertools.pairwise(times))

@@ -440,7 +440,7 @@ def test_deactivated_cleaned_up_and_back(simulated, uc4000, heard, ros):
     assert simulated["left"].measurements[-1] == begun
     assert uc4000.change_state("cleanup")
     assert "left.gain_db" not in uc4000.names()
-    assert ros.wait_for_status("uc4000: left").message == "not configured"
+    ros.wait_for_status("uc4000: left", lambda status: status.message == "not configured")
     assert uc4000.change_state("configure")
     assert uc4000.change_state("activate")
     heard.next("left/range")
