@@ -195,7 +195,8 @@ class Line:
             while (time.monotonic() < end + BACKLOG_TIME and (
                     message := link.receive(max(0.0, end - time.monotonic()))) is not None):
                 streamed = message.arbitration_id == STREAM_ID and message.is_extended_id
-                if streamed and self.on_stream:
+                # At the end nobody waits for what this host, being busy, has not read yet.
+                if streamed and self.on_stream and not self._hurried:
                     self.on_stream(message.data, message.timestamp, link.arrived)
                 if (message.is_extended_id and not message.is_error_frame
                         and request.is_answered_by(message.arbitration_id, message.data)):
