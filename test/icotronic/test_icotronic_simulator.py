@@ -745,12 +745,12 @@ def test_another_channel_is_refused() -> None:
 def test_a_slow_client_holds_up_nobody(bus: can.BusABC, server: SimulatedIcotronic,
                                        monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(simulated_bus, "MAX_WAITING", 20000)
+    server._server.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)  # of its next clients
     slow = socket.create_connection((server.host, server.port))
     with contextlib.closing(slow):
         slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         slow.sendall(b"< open can0 >< rawmode >< echo >")  # and reads nothing of what comes
         _connect(bus)
-        _ask(bus, commands.WRITE_ADC.request(STH, AdcConfiguration(1, 1, 8)))
         _ask(bus, commands.START_ACCELERATION.request(STH, StreamFormat(X, 3)))
         _until(bus, lambda _: server.dropped > 0)
         # This client may be slow as well, but is to hear the answer.
