@@ -48,7 +48,8 @@ def test_a_step_tells_what_was_measured(step, tmp_path):
     assert {row["name"]: row["aim"] for row in rows} == AIMS[step]
     for row in rows:
         assert row["name"] in done.stdout
-        if step == "decoding" and importlib.util.find_spec("icotronic") is None:
+        # test/icotronic/ looks like a package of that name, but has no such module.
+        if step == "decoding" and importlib.util.find_spec("icotronic.can") is None:
             assert row["ours"] is row["other"] is row["figure"] is row["met"] is None
             assert "icotronic is not installed" in row["note"]
             continue
