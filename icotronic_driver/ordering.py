@@ -66,7 +66,7 @@ class FrameOrder:
             if following:
                 return self._go_on(following)
         held.append(frame)
-        return self._go_on(self._rising(held)) if len(held) == MOST_HELD else []
+        return self._give_up() if len(held) == MOST_HELD else []
 
     def rest(self) -> list[Frame]:
         """Return what is held, because nothing more may come."""
@@ -75,30 +75,46 @@ class FrameOrder:
     def _find_place(self, frame: Frame) -> list[Frame]:
         """Return what follows up to a frame that has its place, [] where it is not clear."""
         held, step = self._held, self._step(frame)
-        if step == (self._step(held[-1]) + 1) % COUNTER_TURN:  # both are behind a gap
-            return [*self._rising(held[:-1], self._step(held[-1])), held[-1], frame]
-        if step == 1:  # it was overtaken
-            by_step = {self._step(one): one for one in held}
+        steps = [self._step(one) for one in held]
+        if steps[-2:] == [step - 2, step - 1]:  # three in a row: they are behind a gap
+            return [*self._rising(held[:-2], step - 2), *held[-2:], frame]
+        if step == 1 and 2 in steps:  # it was overtaken
             following = [frame]
-            while len(following) + 1 in by_step:
-                following.append(by_step[len(following) + 1]._replace(
+            while len(following) + 1 in steps:
+                following.append(held[steps.index(len(following) + 1)]._replace(
                     bus_time=frame.bus_time, seen=frame.seen))
             return following
         if step == len(held) + 1:  # none is missing: what is not in its place is damaged
             return [*(one for place, one in enumerate(held, 1) if self._step(one) == place), frame]
         return []
 
+    def _give_up(self) -> list[Frame]:
+        """Return what rises, but for the last of it, which only the next ones can confirm."""
+        rising = self._rising(self._held)
+        last = rising[-1:]
+        self._held = [one for one in self._held if one not in last]
+        following = self._go_on(rising[:-1])
+        if last:
+            self._held, self.expected = last, NONE
+        return following
+
     def _step(self, frame: Frame) -> int:
         return (frame.data[1] - self._last) % COUNTER_TURN
 
     def _rising(self, frames: list[Frame], end: int = COUNTER_TURN) -> list[Frame]:
-        """Return those frames whose counters rise, up to one at `end`."""
-        rising, step = [], 0
+        """Return the most of those frames whose counters rise and stay below `end`.
+
+        Of as many, those with the least missing between them: a damaged counter claims more.
+        """
+        best: list[list[Frame]] = [[]]  # chains, each the longest that ends with its last frame
         for frame in frames:
-            if step < self._step(frame) < end:
-                rising.append(frame)
-                step = self._step(frame)
-        return rising
+            if 0 < self._step(frame) < end:
+                best.append([*max((chain for chain in best if self._end(chain) < self._step(frame)),
+                                  key=len), frame])
+        return max(best, key=lambda chain: (len(chain), -self._end(chain)))
+
+    def _end(self, chain: list[Frame]) -> int:
+        return self._step(chain[-1]) if chain else 0
 
     def _go_on(self, frames: list[Frame]) -> list[Frame]:
         """Return frames, from the last of which it goes on, and drop what else is held."""

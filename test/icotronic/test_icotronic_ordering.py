@@ -75,12 +75,20 @@ def test_a_damaged_counter_moves_no_other_frame(counter):
     assert statistics.fault == f"data frame with counter {counter} behind 3"
 
 
-@pytest.mark.parametrize("damage", [(9, 200), (200, 6), (0, 0), (8, 7)])
-def test_two_damaged_counters_side_by_side_move_no_other_frame(damage):
-    frames = [frame(number) for number in range(12)]
-    frames[4], frames[5] = (frame(counter, 40 + counter) for counter in damage)
-    found, _ = play(frames)
-    assert found[-6:] == numbered(*range(6, 12))
+@pytest.mark.parametrize("damage", [
+    (9, 200), (200, 6), (0, 0), (8, 7), (200, 201), (9, 4), (77, 200, 201), (200, 4, 77)])
+def test_damaged_counters_side_by_side_move_no_other_frame(damage):
+    frames = [frame(number) for number in range(15)]
+    frames[4:4 + len(damage)] = [frame(counter, 40 + counter) for counter in damage]
+    found, statistics = play(frames)
+    assert found == numbered(*range(4), *range(4 + len(damage), 15))
+    assert statistics.damaged + statistics.duplicates == len(damage)
+
+
+def test_a_damaged_counter_among_losses_moves_no_other_frame():
+    numbers = (0, 1, 3, 4, 6, 7, 8, 9, 10, 12, 13)
+    found, _ = play([frame(177 if number == 7 else number, number) for number in numbers])
+    assert found == numbered(*(number for number in numbers if number != 7))
 
 
 def test_losses_beside_a_damaged_counter():
@@ -95,9 +103,15 @@ def test_a_radio_that_loses_every_other_frame():
     assert statistics.lost == 20
 
 
-def test_a_frame_that_was_overtaken_by_two_is_dropped():
+def test_a_frame_that_was_overtaken_by_two_gets_its_place():
     found, statistics = play([frame(number) for number in (0, 2, 3, 1, 4, 5)])
-    assert found == numbered(0, 2, 3, 4, 5)
+    assert found == numbered(*range(6))
+    assert (statistics.lost, statistics.damaged) == (0, 0)
+
+
+def test_a_frame_that_was_overtaken_by_three_is_dropped():
+    found, statistics = play([frame(number) for number in (0, 2, 3, 4, 1, 5, 6)])
+    assert found == numbered(0, *range(2, 7))
     assert (statistics.lost, statistics.damaged) == (1, 1)
 
 
