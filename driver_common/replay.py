@@ -172,8 +172,8 @@ class Replay(FlightRecorder):
     def _note_difference(self, content: bytes) -> None:
         """Take note of a request that was not made then.
 
-        Where it always got the same answer, that one will do; what was measured at another time
-        will not.
+        Where it always got the same answer, that one will do, at once; what was measured at
+        another time will not.
         """
         if not self.differs and self._next < len(self._entries):
             identifier, data = frame_of(content)[1:] if self._is_can else (0, content)
@@ -184,27 +184,25 @@ class Replay(FlightRecorder):
         self._silent = True
         self._borrowed.clear()
         if content in self._answers:
-            request, *rest = self._answers[content]
-            later = self.clock.now - request.time
-            self._borrowed += [entry._replace(time=entry.time + later) for entry in rest]
+            self._borrowed += [entry._replace(time=self.clock.now)
+                               for entry in self._answers[content]]
 
     @cached_property
     def _answers(self) -> Mapping[bytes, Sequence[Entry]]:
-        """Requests that always got the same answer, each with what came at its first place."""
-        places: dict[bytes, list[list[Entry]]] = defaultdict(list)
-        found: list[Entry] = []
+        """Requests that always got the same answer, each with what came."""
+        answers: dict[bytes, list[list[Entry]]] = defaultdict(list)
+        answer: list[Entry] = []
         for entry in self._entries:
+            if entry.kind is Kind.RECEIVED:
+                answer.append(entry)
+            elif entry.kind in (Kind.SENT, Kind.LOST, Kind.GAP):
+                answer = []
             if entry.kind is Kind.SENT:
-                found = [entry]
-                places[entry.content].append(found)
-            elif entry.kind in (Kind.LOST, Kind.GAP):
-                found = []
-            elif found and entry.kind is Kind.RECEIVED:
-                found.append(entry)
-        answered = {content: [place for place in all_ if len(place) > 1]
-                    for content, all_ in places.items()}
-        return {content: some[0] for content, some in answered.items()
-                if len({b"".join(entry.content for entry in rest) for _, *rest in some}) == 1}
+                answers[entry.content].append(answer)
+        given = {content: [answer for answer in some if answer]
+                 for content, some in answers.items()}
+        return {content: some[0] for content, some in given.items()
+                if len({b"".join(entry.content for entry in answer) for answer in some}) == 1}
 
     def _borrow(self, end: int) -> Entry | None:
         """Return what belongs to the answer of another time, None where nothing does until then."""
