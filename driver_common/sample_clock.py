@@ -18,8 +18,8 @@ arrive late, by a changing amount, but never early. What follows from that is ke
 
 Only a break lets the stamps step: the start; arrivals that the line cannot explain, because the
 sensor paused unnoticed or the host slept; and a frame so early that 1 % does not suffice. Breaks
-are counted. What a busy host read late is no break: a backlog is read faster than it was sampled
-and ends at the line, while the frames of a sensor that paused stay late at its own pace.
+are counted. What a busy host read late is no break: a backlog grows or shrinks, and ends at the
+line, while the frames of a sensor that paused stay late at its own pace.
 
 All is done on the monotonic clock, which nobody sets; `HostClock` turns it into the time of day.
 docs/timing.md says what is promised and what trials have shown.
@@ -55,6 +55,8 @@ LATE, EARLY = 2e6, 0.5e6  # ns from which frames are not of the line, at least
 START_EARLY, START_POINTS = 1e9, 10  # the same until the envelope has so many points
 EXCESSES, JITTERS = 8.0, 2.0  # the same in mean excesses of the envelope, and in usual jitters
 STEADY, STEADY_BLOCKS = 0.4e9, 4  # ns and blocks of a lateness after which the sensor had paused
+GROWTH = 4.0  # mean excesses of the envelope by which a steady lateness does not grow
+FALLING_BEHIND = 10e9  # ns for which a host may take frames slower than they come
 SET = 1_000_000  # ns by which the time of day changes only where somebody sets it
 PROMPT, WAITED_MOST = 5_000_000, 60_000_000_000  # ns that what is on a bus waits: usually, at most
 RESTART = 1e9  # ns by which numbers go back only where a stream begins anew
@@ -304,6 +306,11 @@ class SampleClock:
         return max(LATE, JITTERS * self._prior.jitter, JITTERS * self.jitter,
                    EXCESSES * self._envelope.excess)
 
+    @property
+    def _growth_limit(self) -> float:
+        """By how much in ns the least lateness of blocks can grow where the host keeps pace."""
+        return max(LATE, JITTERS * self._prior.jitter, GROWTH * self._envelope.excess)
+
     def _begin_anew(self, arrival: float) -> None:
         """Forget all but the drift, where that is known by now."""
         if len(self._envelope) >= KNOWN_BLOCKS:
@@ -311,6 +318,7 @@ class SampleClock:
         self._envelope = Envelope(self._prior)
         self._queue: Queue | None = None
         self._late: list[tuple[float, float, float]] = []
+        self._late_since = arrival
         self._begun, self.settled = arrival, False
         self._block_end = self._next_look = arrival + FIRST_BLOCK
         self._last_number = self._newest + CATCH_UP / self.nominal_period
@@ -360,9 +368,13 @@ class SampleClock:
     def _follow_a_pause(self, arrival: int, point: tuple[float, float]) -> None:
         """Begin anew where all has been late for long and remains so."""
         late = self._late
+        if not late:
+            self._late_since = arrival
         late.append((arrival, *point))
-        if point[1] < late[0][2] - self._late_limit:
-            del late[:-1]  # it catches up: a backlog
+        grown = point[1] - late[0][2]
+        falls_behind = grown > self._growth_limit and arrival - self._late_since < FALLING_BEHIND
+        if falls_behind or grown < -self._late_limit:
+            del late[:-1]  # a backlog, which grows or shrinks
         if arrival - late[0][0] < STEADY or len(late) < STEADY_BLOCKS:
             return
         self.breaks += 1

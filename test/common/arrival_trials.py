@@ -129,6 +129,18 @@ def pauses(sent: Floats, noise: np.random.Generator) -> Floats:
     return np.maximum(sent, ends)
 
 
+def host_falls_behind(begin: float, length: float, pace: float) -> Delays:
+    """From a time on, let the host take frames at so much of their pace for s, then the rest."""
+    def delays(sent: Floats, noise: np.random.Generator) -> Floats:
+        behind = (sent >= begin * 1e9) & (sent < (begin + length) * 1e9)
+        costs = np.where(behind, SAMPLES * PERIOD / pace, 20e3)
+        arrivals, free = independent(0.05)(sent, noise), 0.0
+        for place, cost in enumerate(costs.tolist()):
+            free = arrivals[place] = max(arrivals[place], free + cost)
+        return arrivals
+    return delays
+
+
 def host_pause(begin: float, length: float, frame_cost: float) -> Delays:
     """Let the host pause at a time, for some s, and then take a frame every `frame_cost` s."""
     def delays(sent: Floats, noise: np.random.Generator) -> Floats:

@@ -90,6 +90,27 @@ def test_what_waited_for_a_host_that_paused_keeps_its_time(length, frame_cost):
     assert trial.back == trial.future == trial.clock.breaks == 0
 
 
+@pytest.mark.parametrize("pace", [0.99, 0.92, 0.5])
+@pytest.mark.parametrize("length", [0.5, 2.0, 4.0])
+def test_what_waits_for_a_host_that_falls_behind_keeps_its_time(length, pace):
+    trial = run(trials.host_falls_behind(6.0, length, pace), 50e-6, seconds=8 + 2.5 * length)
+    assert trial.error(3, share=1.0) < 0.1
+    assert trial.largest_step(1.0) < 0.01
+    assert trial.back == trial.future == trial.clock.breaks == 0
+
+
+@pytest.mark.parametrize("change", [0.002, 0.02])
+def test_a_sensor_that_changes_its_pace_is_followed_at_last(change):
+    def slow_down(numbers, measured, arrivals, later):
+        slower = later * change * (measured - 6e9)
+        return numbers, measured + slower, arrivals + slower
+    trial = stream_with(slow_down, seconds=24.0)
+    assert trial.error(3, 6, share=1.0) < 0.1
+    assert trial.error(19, share=1.0) < 0.1
+    assert trial.clock.breaks == 1
+    assert trial.back == trial.future == 0
+
+
 def stream_with(change, seconds=12.0):
     """Run a stream that is changed after 6 s: numbers, times measured and arrivals, in ns."""
     numbers = numbers_of(seconds)
