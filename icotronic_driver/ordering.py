@@ -76,8 +76,8 @@ class FrameOrder:
         """Return what follows up to a frame that has its place, [] where it is not clear."""
         held, step = self._held, self._step(frame)
         steps = [self._step(one) for one in held]
-        if steps[-2:] == [step - 2, step - 1]:  # three in a row: they are behind a gap
-            return [*self._rising(held[:-2], step - 2), *held[-2:], frame]
+        if steps[-2:] == [(step - back) % COUNTER_TURN for back in (2, 1)]:
+            return [*self._rising(held[:-2], steps[-2]), *held[-2:], frame]  # all behind a gap
         if step == 1 and 2 in steps:  # it was overtaken
             following = [frame]
             while len(following) + 1 in steps:

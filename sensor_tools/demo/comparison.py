@@ -20,7 +20,8 @@ import numpy.typing as npt
 from sensor_tools.demo.machine import Array
 
 ENOUGH = 0.95  # share of the values that must be within their tolerance …
-ENOUGH_BUSY = 0.75  # … and of those that were measured while the machine was busy
+ENOUGH_BUSY = 0.75  # … also with those that were measured while the machine was busy
+FEW = 0.1  # share of the values; fewer lie between two busy times, and are no better than these
 
 
 @dataclass(frozen=True)
@@ -66,13 +67,11 @@ class Comparison:
 
     @property
     def agrees(self) -> bool:
-        """Whether the measurements agree with the truth.
-
-        They are judged together: the few that lie between two busy times are no better than these.
-        """
+        """Whether the measurements agree with the truth."""
         near = self.errors <= self.tolerances
-        enough = np.where(self.busy, ENOUGH_BUSY, ENOUGH)
-        return abs(self.delay) <= self.delay_limit and bool(np.mean(near) >= np.mean(enough))
+        quiet = near[~self.busy]
+        return (abs(self.delay) <= self.delay_limit and bool(np.mean(near) >= ENOUGH_BUSY)
+                and (quiet.size < FEW * near.size or bool(np.mean(quiet) >= ENOUGH)))
 
     def __str__(self) -> str:
         """Say how well the measurements agree with the truth, in one line."""

@@ -81,7 +81,8 @@ def test_a_clock_that_wanders_is_excused_by_a_machine_that_is_late_only():
     assert compare_vibration(wandering, machine(lateness=0.005)).agrees
 
 
-@pytest.mark.parametrize(("busy_from", "agrees"), [(START + 0.6, True), (START + 5, False)])
+@pytest.mark.parametrize(("busy_from", "agrees"), [
+    (START + 0.3, True), (START + 0.6, False), (START + 5, False)])
 def test_a_moment_before_a_busy_time_is_not_judged_alone(busy_from, agrees):
     beginning = np.where(SAMPLES < START + 0.25, 0.02, 0.0)
     busy = machine(lateness=0.004, since=busy_from, until=START + 6)

@@ -427,5 +427,5 @@ def test_what_came_after_a_gap_is_the_same(tmp_path, monkeypatch):
     assert len(again.told) > 5
     # The last one may have been on its way when the recorded one had heard enough. A temperature
     # that was read in the gap is missing then, and read behind it.
-    assert [told for told in again.told[:-1]
-            if told[0] == "measurement" and told not in heard.told] == []
+    others = [told[0] for told in again.told[:-1] if told not in heard.told]
+    assert others in ([], ["temperature"])

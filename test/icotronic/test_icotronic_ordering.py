@@ -85,6 +85,13 @@ def test_damaged_counters_side_by_side_move_no_other_frame(damage):
     assert statistics.damaged + statistics.duplicates == len(damage)
 
 
+@pytest.mark.parametrize("first", [254, 255, 256, 257])
+def test_a_loss_of_about_a_turn(first):
+    found, statistics = play([frame(number) for number in (0, 1, *range(first, first + 5))])
+    assert found == numbered(0, 1, *range(first, first + 5))
+    assert (statistics.lost, statistics.damaged) == (first - 2, 0)
+
+
 def test_a_damaged_counter_among_losses_moves_no_other_frame():
     numbers = (0, 1, 3, 4, 6, 7, 8, 9, 10, 12, 13)
     found, _ = play([frame(177 if number == 7 else number, number) for number in numbers])
