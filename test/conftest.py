@@ -15,6 +15,7 @@ import pathlib
 import shutil
 import signal
 import tempfile
+import zlib
 
 import pytest
 
@@ -50,19 +51,27 @@ os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(profile)
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"  # a field of the wrong type is an error, not a crash
 
 
+@functools.cache
+def shares(path):
+    """Whether the tests of a file share something that starts slowly."""
+    return 'scope="module"' in path.read_text(encoding="utf-8")
+
+
+def pytest_collection_modifyitems(config, items):
+    """Have tests that wait run beside tests that compute: mix them where there are workers."""
+    if hasattr(config, "workerinput"):
+        items.sort(key=lambda item: 0 if shares(item.path) else zlib.crc32(item.nodeid.encode()))
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
     """Hand out tests one by one, but those of files that share something as a whole, and first."""
     from xdist.scheduler import LoadScopeScheduling
 
-    @functools.cache
-    def shares(path):
-        return 'scope="module"' in (config.rootpath / path).read_text(encoding="utf-8")
-
     class Scheduling(LoadScopeScheduling):
         def _split_scope(self, nodeid):
             path = nodeid.partition("::")[0]
-            return path if shares(path) else nodeid
+            return path if shares(config.rootpath / path) else nodeid
 
     return Scheduling(config, log)
 

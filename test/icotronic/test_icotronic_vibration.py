@@ -12,7 +12,6 @@ import math
 
 import numpy as np
 import pytest
-from scipy import integrate, signal
 
 from icotronic_driver.gathering import Samples
 from icotronic_driver.vibration import COLUMNS, SETTLING, Vibration, velocity_filter
@@ -49,6 +48,8 @@ def summary(signals, rate=RATE):
 
 def velocities_by_scipy(signals, rate):
     """Return what SciPy makes of accelerations: filtered, and integrated by trapezoids."""
+    from scipy import integrate, signal  # takes seconds, which every worker would spend
+
     bands = [("hp", 10)] + [("lp", 1000)] * (rate >= 2500)
     sections = np.concatenate([signal.butter(4, corner, kind, fs=rate, output="sos")
                                for kind, corner in bands])

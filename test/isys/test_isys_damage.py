@@ -63,7 +63,7 @@ def test_damage_costs_one_cycle(master, capsys, rate, least):
 def test_a_line_that_never_falls_silent_does_not_hang_the_bus(master, noise):
     link = master.link
     begin = link.clock.now
-    link.noise = noise
+    link.noise = noise * 8
     for _ in range(3):
         before = link.clock.now
         link.clock.sleep(master.bus.poll())

@@ -72,10 +72,10 @@ def test_a_mounting_offset_may_make_ranges_negative():
 
 @pytest.mark.parametrize("name", [model.name for model in MODELS.values()
                                   if model.has_target_lists])
-def test_nothing_that_a_radar_sees_in_an_hour_is_implausible(name):
+def test_nothing_that_a_radar_sees_is_implausible(name):
     model = find_model(name)
     scene, limits = scene_of(model), limits_of(name)
-    for cycle in range(24000):
+    for cycle in range(6000):
         assert not limits.objection(TargetList(1, tuple(scene(0.15 * cycle))))
 
 
@@ -93,10 +93,10 @@ def steady(continuity, targets, cycles=40, cycle=0.075):
                  for target in targets]
 
 
-def test_nothing_jumps_in_a_clean_hour():
+def test_nothing_jumps_on_a_clean_line():
     model, continuity = find_model("iSYS-4003"), Continuity()
     scene, cycle = scene_of(model, 5), model.cycle_time(0)
-    for now in (cycle * number for number in range(round(3600 / cycle))):
+    for now in (cycle * number for number in range(round(900 / cycle))):
         assert not continuity.follow(TargetList(1, tuple(scene(now))), now, now - 2 * cycle)
 
 
@@ -189,7 +189,7 @@ def test_most_wrong_lists_with_a_good_checksum_are_caught(capsys):
     noise, judge = random.Random(7), Judge("iSYS-4001")
     scene = scene_of(find_model("iSYS-4001"), 35)
     counts = collections.Counter()
-    for cycle in range(5000):
+    for cycle in range(2500):
         truth = TargetList(1, tuple(scene(cycle * 0.075)))
         pdu = encode_target_list(truth, Resolution.BITS_32)
         sent = Frame(MASTER, 128, READ_TARGET_LIST, pdu, Delimiter.SD3).encode()

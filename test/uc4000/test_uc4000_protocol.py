@@ -375,7 +375,7 @@ def test_noise_without_an_end_costs_the_same_per_byte_and_fills_no_memory(
     parser = ReplyParser(length)
     parser._buffer = Counting()
     parser.sent(CAST_REQUEST)
-    count = 1000
+    count = 250
     for byte in bytes.fromhex(noise) * count:
         parser.feed(bytes((byte,)))
         assert len(parser.pending) <= 64
