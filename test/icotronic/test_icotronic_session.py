@@ -208,10 +208,13 @@ def listen():
 
 @pytest.fixture
 def connect(start, listen):
-    """Start a network and connect to its sensor; return host, network and simulated sensor."""
-    def connect_one(*, calibrated=True, **options):
+    """Start a network and connect to its sensor; return host, network and simulated sensor.
+
+    The sensor is named, so that nobody waits for others.
+    """
+    def connect_one(*, calibrated=True, sensor_name="Test-STH", **options):
         server = start(calibrated=calibrated)
-        return (listen(server, **options).find(), server.network, server.network.sensors[0])
+        return (listen(server, sensor_name=sensor_name, **options).find(), server.network, server.network.sensors[0])
 
     return connect_one
 
@@ -236,7 +239,7 @@ def assert_true(simulated, stream, *, stamp_error=None):
 
 def test_the_only_sensor_in_range_is_connected_and_identified(connect, monkeypatch):
     monkeypatch.undo()  # with the true times
-    host, network, simulated = connect()
+    host, network, simulated = connect(sensor_name="")
     assert network.stu.connected is simulated
     sensor = host.sensor
     assert (sensor.identity.name, sensor.identity.mac) == ("Test-STH", "08:6B:D7:01:DE:81")
