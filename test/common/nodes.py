@@ -51,7 +51,9 @@ from std_srvs.srv import Trigger
 
 PATIENCE = 5.0  # s for a program that is to end
 DEADLINE = 60.0  # s; far more than anything takes, also on a busy machine
-OFTEN = "import driver_common.diagnostics as d; d.PERIOD = 0.1"  # s; the tests wait for them
+# The tests wait for diagnostics, and a busy machine may take its time to stop a device.
+BEFORE = ("import driver_common.diagnostics as d, driver_common.program as p; "
+          f"d.PERIOD = 0.1; p.STOP_TIME = {DEADLINE}")
 # A test run that is killed must leave no node behind that holds a port (prctl(2)).
 END_WITH_PARENT = "import ctypes; ctypes.CDLL(None).prctl(1, 15)"
 TRANSITIONS = {
@@ -150,7 +152,7 @@ class Process:
 
 
 class NodeProcess(Process):
-    """A node that runs as its user would run it, but for diagnostics that come more often.
+    """A node that runs as its user would run it, but with what `BEFORE` changes.
 
     It is forked, as far as it runs here.
 
@@ -164,7 +166,7 @@ class NodeProcess(Process):
     def __init__(self, module, parameters=None, *arguments, **how):
         for name, value in (parameters or {}).items():
             arguments += "-p", f"{name}:={json.dumps(value)}"
-        super().__init__(module, "--ros-args", *arguments, before=OFTEN,
+        super().__init__(module, "--ros-args", *arguments, before=BEFORE,
                          forked="within" not in how, **how)
 
 

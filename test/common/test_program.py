@@ -14,7 +14,7 @@ import signal
 from pathlib import Path
 
 import pytest
-from nodes import Process
+from nodes import DEADLINE, Process
 
 from isys_radar_driver.simulator.line import simulated_line
 
@@ -105,8 +105,9 @@ def test_a_middleware_that_hangs_does_not_keep_the_process():
 
 
 def test_a_node_leaves_no_shared_memory_of_the_middleware():
+    before = f"import driver_common.program as p; p.MIDDLEWARE_TIME = {DEADLINE}"
     arguments = "--ros-args", "-p", "serial_port:=sim://iSYS-4001"
-    with Process("isys_radar_driver.program", *arguments) as process:
+    with Process("isys_radar_driver.program", *arguments, before=before) as process:
         process.wait_for_line("connected to")
         mapped = set(re.findall(r"/dev/shm/fastrtps_[0-9a-f]{16}$",
                                 Path(f"/proc/{process.number}/maps").read_text(), re.MULTILINE))

@@ -537,8 +537,9 @@ def test_after_a_service_that_disconnects_the_stream_comes_back(station, service
 def test_losses_are_told_in_log_and_diagnostics(station):
     line = len(station.process.lines)
     station.network.faults.loss = 0.3
-    status = station.wait_for_status(lambda status: status.level == WARN)
-    assert "frames lost on the radio in the last 30 s; bring the sensor nearer" in status.message
+    status = station.wait_for_status(lambda status: (
+        "frames lost on the radio in the last 30 s; bring the sensor nearer" in status.message))
+    assert status.level == WARN
     assert int(status.values["lost frames"]) > 0
     station.process.wait_for_line("were lost on the radio", line)
     station.network.faults.loss = 0.0

@@ -214,7 +214,8 @@ def connect(start, listen):
     """
     def connect_one(*, calibrated=True, sensor_name="Test-STH", **options):
         server = start(calibrated=calibrated)
-        return (listen(server, sensor_name=sensor_name, **options).find(), server.network, server.network.sensors[0])
+        host = listen(server, sensor_name=sensor_name, **options).find()
+        return host, server.network, server.network.sensors[0]
 
     return connect_one
 

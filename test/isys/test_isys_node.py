@@ -337,8 +337,9 @@ def test_overrides_that_are_not_possible_are_named_and_the_rest_works(station):
     here.process.wait_for_line("output1.range_max = 999 m is out of range, allowed is 0 … 150 m")
     here.process.wait_for_line("output2.range_max must be a number, not 'far'")
     assert here.radar.value("frequency_channel") == 3
-    status = here.ros.wait_for_status("isys_radar: radar", lambda status: status.level == WARN)
-    assert status.message == "2 settings are not as wanted"
+    status = here.ros.wait_for_status("isys_radar: radar", lambda status: (
+        status.message == "2 settings are not as wanted"))
+    assert status.level == WARN
     assert status.values["output2.range_max differs"] == "wanted far, reported 150.0"
 
 

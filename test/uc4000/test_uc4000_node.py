@@ -412,7 +412,8 @@ def test_diagnostics_of_a_group_that_fails(simulated, uc4000, heard, ros):
         return reply(request, now)
 
     right.reply = refuse
-    status = ros.wait_for_status("uc4000: left", lambda status: status.level == WARN)
+    status = ros.wait_for_status("uc4000: left", lambda status: "its group" in status.message)
+    assert status.level == WARN
     share = float(status.values["failed lately [%]"])
     assert status.message == (f"{share:.0f}% of the measurements together with its group fail"
                               + ", so they measure one by one" * ("one by one" in status.message))
