@@ -14,7 +14,8 @@ Nothing about a setting is written down anywhere else.
 from __future__ import annotations
 
 import struct
-from collections.abc import Mapping
+from bisect import bisect_left
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from driver_common.errors import SettingError
@@ -167,8 +168,8 @@ def nearest_adc_configuration(sample_rate: float,
     leaves most time to take the signal (field note N8).
     """
     candidates = [AdcConfiguration(prescaler, acquisition, oversampling, reference_voltage)
-                  for oversampling in OVERSAMPLING_RATES
-                  for acquisition in ACQUISITION_TIMES for prescaler in RECOMMENDED_PRESCALERS]
+                  for oversampling in OVERSAMPLING_RATES for acquisition in ACQUISITION_TIMES
+                  for prescaler in _prescalers_around(sample_rate, acquisition, oversampling)]
 
     def deviation(candidate: AdcConfiguration) -> float:
         return abs(candidate.sample_rate - sample_rate)
@@ -177,3 +178,11 @@ def nearest_adc_configuration(sample_rate: float,
     most = max((one.oversampling_rate for one in near), default=0)
     return min([one for one in near if one.oversampling_rate == most] or candidates,
                key=lambda one: (deviation(one), -one.oversampling_rate, one.prescaler))
+
+
+def _prescalers_around(sample_rate: float, acquisition: int, oversampling: int) -> Sequence[int]:
+    """Return those with the rates next to the wanted one; the rates fall with the prescaler."""
+    below = bisect_left(
+        RECOMMENDED_PRESCALERS, -sample_rate,
+        key=lambda prescaler: -AdcConfiguration(prescaler, acquisition, oversampling).sample_rate)
+    return RECOMMENDED_PRESCALERS[max(0, below - 1):below + 1]
