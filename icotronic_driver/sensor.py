@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import NamedTuple
+from typing import Any, NamedTuple, cast
 
 from driver_common.device import Device, DeviceOptions
 from driver_common.sample_clock import SampleClock
@@ -253,17 +253,10 @@ class Sensor(Device):
 
     @property
     def adc(self) -> AdcConfiguration:
-        """The ADC configuration that the sensor reported."""
-        values = self.values
-        default = AdcConfiguration()
-        return AdcConfiguration(
-            int(values.get("adc.prescaler", default.prescaler)),  # type: ignore[arg-type]
-            int(values.get("adc.acquisition_time",  # type: ignore[arg-type]
-                           default.acquisition_time)),
-            int(values.get("adc.oversampling_rate",  # type: ignore[arg-type]
-                           default.oversampling_rate)),
-            float(values.get("adc.reference_voltage",  # type: ignore[arg-type]
-                             default.reference_voltage)))
+        """The ADC configuration that the sensor reported; where it did not, as after a reset."""
+        return AdcConfiguration(**{
+            name.removeprefix("adc."): cast("Any", value)
+            for name, value in self.values.items() if name.startswith("adc.")})
 
     @property
     def format(self) -> StreamFormat:
