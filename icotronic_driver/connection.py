@@ -32,7 +32,7 @@ from icotronic_driver.settings import SETTINGS
 
 CONNECT_RETRY = 3.0  # s until the connect is asked for again (errata C4)
 CONNECT_TIMEOUT = 21.0  # s until another search; a sensor may take 20 (field note N1)
-CONNECT_POLL = 0.1  # s
+CONNECT_POLL = 0.05  # s; what is asked for in it takes some ms
 SETTLE_TIME = 0.6  # s in which the same sensors must be in range before one is taken
 PATIENCE = 3.0  # s in which all sensors are seen: asleep they advertise every 2.5 s (field note N5)
 RELEASE_TIMEOUT, RELEASE_ATTEMPTS = 0.3, 3  # s
