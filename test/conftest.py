@@ -57,10 +57,17 @@ def shares(path):
     return 'scope="module"' in path.read_text(encoding="utf-8")
 
 
+def place(item):
+    """Where a test comes: mixed with the others; no long one, with a limit of its own, is last."""
+    if shares(item.path):
+        return 0
+    return zlib.crc32(item.nodeid.encode()) >> bool(item.get_closest_marker("timeout"))
+
+
 def pytest_collection_modifyitems(config, items):
     """Have tests that wait run beside tests that compute: mix them where there are workers."""
     if hasattr(config, "workerinput"):
-        items.sort(key=lambda item: 0 if shares(item.path) else zlib.crc32(item.nodeid.encode()))
+        items.sort(key=place)
 
 
 @pytest.hookimpl(optionalhook=True)
